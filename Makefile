@@ -1,0 +1,47 @@
+# make run [SCENARIO=scenarios/...yaml], make view, make test; everything is installed into .venv.
+PYTHON ?= python3
+SCENARIO ?= scenarios/mixed_0p5hz_10hz.yaml
+BIN := .venv/bin
+# One thread per library: the chain is sequential, and the tests run side by side.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: run view test lint bench baseline clean
+.DELETE_ON_ERROR:
+
+$(BIN)/python:
+	$(PYTHON) -m venv .venv
+
+.venv/installed: pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	touch $@
+
+.venv/installed-test: .venv/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[test]"
+	touch $@
+
+run: .venv/installed
+	$(BIN)/testbed run $(SCENARIO)
+
+view: .venv/installed
+	@last=$$(ls -1dt runs/*/ 2>/dev/null | head -n 1); \
+	if [ -z "$$last" ]; then echo "no run yet: type 'make run' first" >&2; exit 2; fi; \
+	$(BIN)/testbed view "$$last"
+
+lint: .venv/installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
+
+bench: .venv/installed-test
+	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
+
+# Rewrites the stored error-against-frequency curves; say in the commit why they moved.
+baseline: .venv/installed-test
+	$(BIN)/python -m tests.regression.error_vs_frequency
+
+clean:
+	rm -rf .venv runs

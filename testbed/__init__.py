@@ -1,0 +1,52 @@
+"""Physics testbed for wide-band angular-rate sensing.
+
+Data flows one way: scenario -> commanded motion -> turntable (truth) -> sensors (readings) -> fusion (estimates) -> results.
+
+Conventions: SI floats inside (rate [rad/s], angle [rad], frequency [Hz], time [s]); noise densities are two-sided root densities
+[rad/sqrt(s)], so that white noise sampled at interval T has the standard deviation N/sqrt(T); units live in YAML files, tables and plots only.
+Truth is the inertial rate at a sensor's site, never the encoder; the filters know readings and their own belief, never the truth.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
+
+if TYPE_CHECKING:
+    from testbed.loader import load_scenario
+    from testbed.results import Run
+    from testbed.runner import run
+    from testbed.scenario import Scenario
+    from testbed.store import open_run
+
+__version__ = "0.1.0"
+__all__ = [
+    "Problem",
+    "Run",
+    "RunError",
+    "Scenario",
+    "ScenarioError",
+    "UnknownNameError",
+    "__version__",
+    "load_scenario",
+    "open_run",
+    "run",
+]
+
+_LAZY = {
+    "Run": "testbed.results",
+    "Scenario": "testbed.scenario",
+    "load_scenario": "testbed.loader",
+    "open_run": "testbed.store",
+    "run": "testbed.runner",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Heavy libraries load on first use, so that `testbed --help` answers at once.
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
+    msg = f"module 'testbed' has no attribute {name!r}"
+    raise AttributeError(msg)

@@ -1,0 +1,140 @@
+"""Command line. Imports here are light: each command loads what it needs."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from testbed.errors import RunError, ScenarioError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+app = typer.Typer(
+    name="testbed",
+    help="Physics testbed for wide-band angular-rate sensing.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+OK, MISSED, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
+RunDir = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run folder.")]
+
+
+@app.command()
+def run(
+    scenario: ScenarioFile,
+    out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/<scenario name>.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")] = None,
+    block: Annotated[float, typer.Option(help="Length of a block in seconds; the result does not depend on it.")] = 1.0,
+    view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
+) -> None:
+    """Run a scenario, print its errors and write the run folder."""
+    from testbed.loader import load_scenario
+    from testbed.runner import run as run_scenario
+    from testbed.terminal import print_metrics, progress
+
+    if not block > 0.0:
+        problem = f"--block: expected more than 0 s, got {block}"
+        raise ScenarioError(problem)
+    loaded = load_scenario(scenario)
+    target = out or Path("runs") / loaded.name
+    with progress(loaded.name, loaded.frame.duration) as tick:
+        result = run_scenario(loaded, out=target, seed=seed, block=block, progress=tick)
+    print_metrics(result.metrics, target)
+    if view:
+        from testbed.viewer import open_viewer
+
+        open_viewer(target)
+    if not all(row["met"] for row in result.metrics["expectations"]):
+        raise typer.Exit(MISSED)
+
+
+@app.command()
+def check(scenario: ScenarioFile) -> None:
+    """Validate a scenario and print what was understood."""
+    from testbed.loader import load_scenario
+    from testbed.terminal import print_scenario
+
+    print_scenario(load_scenario(scenario))
+
+
+@app.command("list")
+def list_parts() -> None:
+    """List motions, sensors, presets and filters."""
+    from testbed.catalogue import catalogue
+    from testbed.terminal import print_catalogue
+
+    print_catalogue(catalogue())
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a scenario, for editors."""
+    import json
+
+    from testbed.catalogue import schema as scenario_schema
+
+    typer.echo(json.dumps(scenario_schema(), indent=2))
+
+
+@app.command()
+def view(run_dir: RunDir) -> None:
+    """Open the recording of a run in the Rerun viewer."""
+    from testbed.viewer import open_viewer
+
+    open_viewer(run_dir)
+
+
+@app.command()
+def report(run_dir: RunDir) -> None:
+    """Write the static report of a run again."""
+    from testbed.report import write_report
+
+    typer.echo(f"wrote {write_report(run_dir)}")
+
+
+def main() -> None:
+    """Run the command line; errors become one clear message and the exit status of the contract."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        status = app(standalone_mode=False)
+    except ScenarioError as error:
+        _fail(str(error), BAD_INPUT)
+    except RunError as error:
+        _fail(str(error), FAILED)
+    except KeyboardInterrupt:
+        _fail("interrupted; nothing was left behind", INTERRUPTED)
+    except Exception as error:  # noqa: BLE001 - told apart by _exit_of, which raises what it does not know
+        _exit_of(error)
+    sys.exit(status if isinstance(status, int) else OK)
+
+
+def _exit_of(error: Exception) -> NoReturn:
+    """Exit as the command-line library asks; anything else is a fault of ours and keeps its traceback."""
+    show: Callable[[], None] | None = getattr(error, "show", None)
+    if show is not None:
+        show()
+        sys.exit(BAD_INPUT)
+    if type(error).__name__ == "Abort":
+        _fail("interrupted; nothing was left behind", INTERRUPTED)
+    if isinstance(error, BrokenPipeError):
+        sys.exit(OK)
+    raise error
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _fail(message: str, status: int) -> NoReturn:
+    typer.echo(message if status == INTERRUPTED else f"error: {message}", err=True)
+    sys.exit(status)

@@ -1,0 +1,1 @@
+"""Deterministic physics: commanded motion, turntable, MHD channel. No sample clocks of instruments, no noise."""

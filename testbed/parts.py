@@ -1,0 +1,78 @@
+"""Parts that a scenario names: closed parameter sets, their registries and their presets."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+from importlib import resources
+from typing import TYPE_CHECKING, Any, cast
+
+from pydantic import BaseModel, ConfigDict
+
+from testbed.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Part(BaseModel):
+    """Frozen parameters of one block of the chain; SI floats from Python, strings with units from YAML."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True, validate_default=True)
+
+
+def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:
+    """Import the class that `registry` (name -> ``package.module:Class``) knows as `name`.
+
+    A `name` that contains a colon is a user's own ``package.module:Class``.
+
+    Raises
+    ------
+    UnknownNameError
+        If the name, the module or the class does not exist.
+    """
+    target = name if ":" in name else registry.get(name)
+    if target is None:
+        raise UnknownNameError(kind, name, registry)
+    module, _, attribute = target.partition(":")
+    try:
+        return cast("type[Any]", getattr(importlib.import_module(module), attribute))
+    except (ImportError, AttributeError) as error:
+        raise UnknownNameError(kind, name, registry) from error
+
+
+def preset_names(package: str) -> list[str]:
+    """Return the names of the presets shipped in `package`'s folder `presets`."""
+    folder = resources.files(package) / "presets"
+    return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+
+
+@functools.cache
+def _preset_text(package: str, name: str) -> str:
+    names = preset_names(package)
+    if name not in names:
+        kind = "preset"
+        raise UnknownNameError(kind, name, names)
+    return (resources.files(package) / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
+
+
+def preset(package: str, name: str) -> dict[str, Any]:
+    """Return the plain mapping (strings with units) of a shipped preset.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such preset; lists the known ones.
+    """
+    from ruamel.yaml import YAML
+
+    return cast("dict[str, Any]", YAML(typ="safe", pure=True).load(_preset_text(package, name)))
+
+
+def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `base` with the keys of `override` laid over it, nested mappings merged."""
+    merged = dict(base)
+    for key, value in override.items():
+        below = merged.get(key)
+        merged[key] = merge(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return merged

@@ -1,0 +1,159 @@
+"""A scenario: everything that one experiment needs, validated before anything runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, Field
+
+from testbed.parts import Part
+from testbed.units import Duration, Frequency, PositiveDuration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.models.motion import Motion
+    from testbed.models.turntable import TurntableParameters
+    from testbed.sensors.base import Sensor
+
+BASE_RATE_HZ = 20_000.0
+
+
+class Frame(Part):
+    """The keys of a scenario that are no parts of their own.
+
+    Parameters
+    ----------
+    name : str
+        Names the run folder.
+    description : str, optional
+        What the experiment shows.
+    seed : int, optional
+        Seed of every random stream.
+    duration : float
+        Length of the run [s].
+    settle : float, optional
+        Metrics start here [s].
+    ramp_in : float, optional
+        Smooth ramp-in of the motion [s].
+    bandwidth : float, optional
+        Bandwidth W of the noise floor in the metrics [Hz].
+    detail : tuple of two floats, optional
+        From when to when the recording holds every sample [s]; two seconds after `settle` if not given.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    duration: PositiveDuration
+    settle: Duration = 0.0
+    ramp_in: Duration = 0.5
+    bandwidth: Frequency = 1000.0
+    detail: tuple[Duration, Duration] | None = None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One expectation: `metric` of `subject` compared with `limit`."""
+
+    subject: str
+    metric: str
+    relation: str
+    limit: float
+
+    def met(self, value: float | None) -> bool:
+        """Return whether `value` is within the bound; an undefined value is not."""
+        if value is None:
+            return False
+        return {"<": value < self.limit, "<=": value <= self.limit, ">": value > self.limit, ">=": value >= self.limit}[
+            self.relation
+        ]
+
+
+@dataclass(frozen=True)
+class FilterSpec:
+    """One fusion filter of a scenario: its class, parameters, belief and the sensors that it reads."""
+
+    type: str
+    factory: Callable[..., Any]
+    parameters: Any
+    belief: Mapping[str, SensorBelief]
+    belief_name: Any
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A validated scenario in SI.
+
+    `source` is the mapping as written in the file, with the user's units; `file` is where it stands.
+    """
+
+    frame: Frame
+    turntable: TurntableParameters
+    motion: tuple[tuple[str, Motion], ...]
+    sensors: Mapping[str, Sensor]
+    sensor_types: Mapping[str, str]
+    fusion: Mapping[str, FilterSpec]
+    expect: tuple[Bound, ...]
+    file: str
+    source: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.frame.name
+
+    @property
+    def n_time(self) -> int:
+        """Number of samples of the base clock."""
+        return round(self.frame.duration * BASE_RATE_HZ)
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        """Commanded line frequencies [Hz], ascending."""
+        return tuple(sorted({line for _, motion in self.motion for line in motion.lines()}))
+
+    @property
+    def detail(self) -> tuple[float, float]:
+        """From when to when the recording holds every sample [s]."""
+        start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + 2.0)
+        return start, min(stop, self.frame.duration)
+
+    def with_seed(self, seed: int) -> Scenario:
+        """Return the same scenario under another seed."""
+        return replace(self, frame=self.frame.model_copy(update={"seed": seed}))
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the whole scenario as a mapping with SI units, which loads to the same scenario again."""
+
+        def dump(part: BaseModel) -> dict[str, Any]:
+            return part.model_dump(mode="json", context={"border": True}, exclude_none=True)
+
+        return {
+            **dump(self.frame),
+            "turntable": dump(self.turntable),
+            "motion": [{kind: dump(motion)} for kind, motion in self.motion],
+            "sensors": {
+                name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
+            },
+            "fusion": {
+                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                for name, spec in self.fusion.items()
+            },
+            "expect": _expectations(self.expect),
+        }
+
+
+def _parameters(spec: FilterSpec) -> dict[str, Any]:
+    if isinstance(spec.parameters, BaseModel):
+        return spec.parameters.model_dump(mode="json", context={"border": True}, exclude_none=True)
+    return dict(spec.parameters)
+
+
+def _expectations(bounds: tuple[Bound, ...]) -> dict[str, dict[str, str]]:
+    table: dict[str, dict[str, str]] = {}
+    for bound in bounds:
+        table.setdefault(bound.subject, {})[bound.metric] = f"{bound.relation} {bound.limit!r}"
+    return table

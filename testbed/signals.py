@@ -1,0 +1,164 @@
+"""Sampled signals: exact time bases, named random streams, and linear filters that keep their state between blocks."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def sample_times(start: int, n_time: int, sample_rate_hz: float) -> FloatArray:
+    """Return k / fs for k = start ... start + n_time - 1 [s]; never an accumulated sum, so it does not drift."""
+    times: FloatArray = np.arange(start, start + n_time) / sample_rate_hz
+    return times
+
+
+def random_stream(seed: int, *names: str) -> np.random.Generator:
+    """Return the generator that belongs to `names` under `seed`.
+
+    Each name (sensor, noise term) has a stream of its own, so that adding or switching off one leaves the others bit-identical.
+    """
+    key = tuple(zlib.crc32(name.encode()) for name in names)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+@njit(cache=True)
+def _advance(x, Phi, Gamma, step, C, D, previous, u, y):  # type: ignore[no-untyped-def] # pragma: no cover
+    """x+ = Phi x + Gamma u + step (u+ - u); y = C x + D u."""
+    n = x.size
+    x_next = np.empty(n)
+    for k in range(u.size):
+        increment = u[k] - previous
+        total = D * u[k]
+        for i in range(n):
+            value = Gamma[i] * previous + step[i] * increment
+            for j in range(n):
+                value += Phi[i, j] * x[j]
+            x_next[i] = value
+            total += C[i] * value
+        for i in range(n):
+            x[i] = x_next[i]
+        previous = u[k]
+        y[k] = total
+    return previous
+
+
+class LinearFilter:
+    r"""A transfer function in time, exact for an input that is linear between samples (first-order hold).
+
+    .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
+
+    State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0 before the first sample;
+    a first sample other than zero is a step).
+
+    Parameters
+    ----------
+    numerator, denominator : array_like
+        Coefficients in s [rad/s], highest power first; the numerator's degree is at most the denominator's.
+    sample_rate_hz : float
+        Rate of the samples [Hz].
+
+    Raises
+    ------
+    ValueError
+        If the transfer function is improper.
+    """
+
+    def __init__(
+        self, numerator: FloatArray | list[float], denominator: FloatArray | list[float], sample_rate_hz: float
+    ) -> None:
+        A, B, C, D = companion(
+            np.atleast_1d(np.asarray(numerator, float)), np.atleast_1d(np.asarray(denominator, float))
+        )
+        n, T = B.size, 1.0 / sample_rate_hz
+        block = np.zeros((n + 2, n + 2))
+        block[:n, :n], block[:n, n], block[n, n + 1] = A * T, B * T, 1.0
+        power = expm(block)
+        self._Phi, self._Gamma, self._step = power[:n, :n].copy(), power[:n, n].copy(), power[:n, n + 1].copy()
+        self._C, self._D = C, D
+        self._x, self._previous, self._started = np.zeros(n), 0.0, False
+
+    def process(self, u: FloatArray) -> FloatArray:
+        """Filter the next samples.
+
+        Parameters
+        ----------
+        u : ndarray, shape (n_time,)
+            Input, any unit.
+
+        Returns
+        -------
+        ndarray, shape (n_time,)
+            Output at the same instants, unit of `u`.
+        """
+        y = np.empty(u.size)
+        if u.size and not self._started:
+            # A jump at t = 0 leaves the state at rest: only the feed-through passes it at once.
+            self._previous, self._started = float(u[0]), True
+            y[0] = self._D * u[0]
+            self._previous = _advance(
+                self._x, self._Phi, self._Gamma, self._step, self._C, self._D, self._previous, u[1:], y[1:]
+            )
+        elif u.size:
+            self._previous = _advance(
+                self._x, self._Phi, self._Gamma, self._step, self._C, self._D, self._previous, u, y
+            )
+        return y
+
+
+def companion(numerator: FloatArray, denominator: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return (A, B, C, D) of a transfer function in a companion form balanced by a diagonal scaling of powers of the corner.
+
+    Parameters
+    ----------
+    numerator, denominator : ndarray, shapes (n_num,), (n_state + 1,)
+        Coefficients in s, highest power first.
+
+    Returns
+    -------
+    A, B, C : ndarray, shapes (n_state, n_state), (n_state,), (n_state,)
+        State matrices [1/s], [1/s], [-].
+    D : float
+        Feed-through.
+
+    Raises
+    ------
+    ValueError
+        If the degree of the numerator exceeds the denominator's or the leading coefficient is zero.
+    """
+    a = np.trim_zeros(denominator, "f")
+    b = np.trim_zeros(numerator, "f")
+    n = a.size - 1
+    if a.size == 0 or b.size > a.size:
+        msg = f"numerator: expected a degree of at most {n}, got {b.size - 1}"
+        raise ValueError(msg)
+    b = np.concatenate([np.zeros(a.size - b.size), b]) / a[0]
+    a = a / a[0]
+    D = float(b[0])
+    remainder = b[1:] - D * a[1:]
+    # s = w s': with the geometric mean of the poles as unit of frequency the coefficients are of order one.
+    corner = float(abs(a[-1]) ** (1.0 / n)) if n and a[-1] != 0.0 else 1.0
+    scale = corner ** np.arange(1, n + 1)
+    A = np.zeros((n, n))
+    B = np.zeros(n)
+    if n:
+        A[0] = -a[1:] / scale
+        A[1:, :-1] = np.eye(n - 1)
+        A *= corner
+        B[0] = corner
+    return A, B, remainder / scale, D
+
+
+def transfer(
+    numerator: FloatArray | list[float], denominator: FloatArray | list[float], freq_hz: FloatArray
+) -> ComplexArray:
+    """Return b(s)/a(s) at s = 2 pi j f, complex, shape (n_freq,)."""
+    s = 2j * np.pi * np.asarray(freq_hz, float)
+    value: ComplexArray = np.polyval(np.asarray(numerator, float), s) / np.polyval(np.asarray(denominator, float), s)
+    return value

@@ -1,0 +1,234 @@
+"""Units at the border: strings with units in, SI floats inside.
+
+Angle and cycle are dimensions of their own, so that `10 rad/s` is no frequency, `1 Hz` no rate and `4 mrad` no number.
+Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(Hz)` and `deg/sqrt(h)` are both rad/sqrt(s).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import pint
+from pydantic_core import PydanticCustomError, core_schema
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+
+_DEFINITIONS = """
+nano- = 1e-9 = n-
+micro- = 1e-6 = u- = µ- = μ-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+second = [time] = s
+meter = [length] = m
+gram = [mass] = g
+ampere = [current] = A
+kelvin = [temperature] = K
+radian = [angle] = rad
+cycle = [cycle]
+count = [count] = LSB
+minute = 60 * second = min
+hour = 3600 * second = h
+day = 86400 * second
+degree = 3.141592653589793 / 180 * radian = deg
+arcminute = degree / 60 = arcmin
+arcsecond = degree / 3600 = arcsec
+revolution = 2 * 3.141592653589793 * radian = rev
+hertz = cycle / second = Hz
+newton = kilogram * meter / second ** 2 = N
+pascal = newton / meter ** 2 = Pa
+joule = newton * meter = J
+watt = joule / second = W
+volt = watt / ampere = V
+ohm = volt / ampere
+siemens = ampere / volt = S
+tesla = volt * second / meter ** 2 = T
+henry = volt * second / ampere = H
+farad = ampere * second / volt = F
+"""
+
+_NUMBER = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)\w*)\s*(.*)", re.IGNORECASE | re.DOTALL
+)
+
+
+@functools.cache
+def _registry() -> pint.UnitRegistry:
+    registry = pint.UnitRegistry(None)
+    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    return registry
+
+
+@functools.cache
+def _factor(unit: str, si: str, *, cycle_is_number: bool) -> float:
+    """Return the factor from `unit` to `si`; ValueError with the expectation if the dimensions differ."""
+    registry = _registry()
+    text = unit.replace("^", "**")
+    text = re.sub(r"sqrt\(([^()]*)\)", r"((\1)**0.5)", text)
+    try:
+        given = registry.Quantity(1.0, registry.parse_units(text)).to_base_units()
+    except Exception as error:
+        msg = f"unit {unit!r} is not understood"
+        raise ValueError(msg) from error
+    wanted = registry.Quantity(1.0, registry.parse_units(si.replace("^", "**") if si else "")).to_base_units()
+    have, want = dict(given.dimensionality), dict(wanted.dimensionality)
+    if cycle_is_number:
+        have.pop("[cycle]", None)
+    if have.keys() != want.keys() or any(not math.isclose(have[k], want[k]) for k in want):
+        msg = f"{unit!r} has the wrong dimension"
+        raise ValueError(msg)
+    return float(given.magnitude / wanted.magnitude)
+
+
+def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = False) -> float:
+    """Read a number with its unit and return it in the SI unit `si`.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``0.15 deg/sqrt(h)``.
+    si : str
+        The unit of the result, such as ``rad*s^-0.5``.
+    example : str, optional
+        A correct value, for the message.
+    cycle_is_number : bool, optional
+        Accept Hz where 1/s is meant (densities).
+
+    Returns
+    -------
+    float
+        The value in `si`.
+
+    Raises
+    ------
+    ValueError
+        If the number, the unit or the dimension is wrong; NaN and infinity are refused.
+    """
+    expected = f"expected a quantity in {si}" + (f", such as {example!r}" if example else "")
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        msg = f"{expected}, got {text!r}"
+        raise ValueError(msg)
+    number, unit = float(match[1]), match[2].strip()
+    if not math.isfinite(number):
+        msg = f"{expected}, got {text!r}, which is not finite"
+        raise ValueError(msg)
+    if not unit:
+        msg = f"{expected}, got {text!r}: the unit is missing"
+        raise ValueError(msg)
+    try:
+        value = number * _factor(unit, si, cycle_is_number=cycle_is_number)
+    except ValueError as error:
+        msg = f"{expected}, got {text!r}: {error}"
+        raise ValueError(msg) from error
+    if not math.isfinite(value):
+        msg = f"{expected}, got {text!r}, which is not finite"
+        raise ValueError(msg)
+    return value
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Pydantic annotation of a float that carries a unit at the border.
+
+    A YAML file gives a string with a unit (validation context ``{"border": True}``); Python gives an SI float.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit of the float.
+    example : str
+        A correct value, shown in messages and in the schema.
+    above, at_least, at_most : float, optional
+        Bounds in SI; `above` is exclusive.
+    cycle_is_number : bool, optional
+        For densities per hertz.
+    """
+
+    unit: str
+    example: str
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    cycle_is_number: bool = False
+
+    def validate(self, value: Any, info: ValidationInfo) -> float:
+        """Return the SI float of `value`; raise a pydantic error that says what was expected."""
+        try:
+            si = self._read(value, border=bool((info.context or {}).get("border")))
+            self._bound(si, value)
+        except ValueError as error:
+            kind = "quantity"
+            raise PydanticCustomError(kind, "{reason}", {"reason": str(error)}) from error
+        return si
+
+    def _read(self, value: Any, *, border: bool) -> float:
+        if isinstance(value, str):
+            return parse(value, self.unit, example=self.example, cycle_is_number=self.cycle_is_number)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {value!r}"
+            raise ValueError(msg)
+        if border:
+            msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {value!r}: the unit is missing"
+            raise ValueError(msg)
+        return float(value)
+
+    def _bound(self, si: float, value: Any) -> None:
+        checks = (
+            (self.above is not None and si <= (self.above or 0.0), f"more than {self.above}"),
+            (self.at_least is not None and si < (self.at_least or 0.0), f"at least {self.at_least}"),
+            (self.at_most is not None and si > (self.at_most or 0.0), f"at most {self.at_most}"),
+        )
+        for failed, bound in checks:
+            if failed:
+                msg = f"expected {bound} {self.unit}, got {value!r}"
+                raise ValueError(msg)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            self.validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(self._write, info_arg=True),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "description": f"quantity in {self.unit}", "examples": [self.example]}
+
+    def _write(self, value: float, info: Any) -> str | float:
+        return f"{value!r} {self.unit}" if (info.context or {}).get("border") else value
+
+
+Angle = Annotated[float, Quantity("rad", "5 mrad")]
+AngularAcceleration = Annotated[float, Quantity("rad/s^2", "0.1 deg/h/s")]
+Current = Annotated[float, Quantity("A", "2 A", at_least=0.0)]
+Duration = Annotated[float, Quantity("s", "20 s", at_least=0.0)]
+PositiveDuration = Annotated[float, Quantity("s", "20 s", above=0.0)]
+Frequency = Annotated[float, Quantity("Hz", "10 Hz", above=0.0)]
+Length = Annotated[float, Quantity("m", "15 mm", above=0.0)]
+Position = Annotated[float, Quantity("m", "15 mm")]
+Mass = Annotated[float, Quantity("kg", "20 kg", above=0.0)]
+Inertia = Annotated[float, Quantity("kg*m^2", "0.05 kg*m^2", above=0.0)]
+Torque = Annotated[float, Quantity("N*m", "6 N*m", at_least=0.0)]
+AngularDrag = Annotated[float, Quantity("N*m*s/rad", "0.5 mN*m*s/rad", at_least=0.0)]
+Rate = Annotated[float, Quantity("rad/s", "1 deg/s")]
+Range = Annotated[float, Quantity("rad/s", "30 deg/s", above=0.0)]
+RateStd = Annotated[float, Quantity("rad/s", "2.7 deg/h", at_least=0.0)]
+RateVariance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", at_least=0.0)]
+RatePsd = Annotated[float, Quantity("rad^2/s", "1e-6 (deg/s)^2/Hz", at_least=0.0, cycle_is_number=True)]
+RateDensity = Annotated[float, Quantity("rad*s^-0.5", "0.15 deg/sqrt(h)", at_least=0.0, cycle_is_number=True)]
+RateRandomWalk = Annotated[float, Quantity("rad*s^-1.5", "0.1 deg/h/sqrt(h)", at_least=0.0, cycle_is_number=True)]
+QuantizationAngle = Annotated[float, Quantity("rad", "1 urad", at_least=0.0)]
+MagneticField = Annotated[float, Quantity("T", "0.448 T", at_least=0.0)]
+MassDensity = Annotated[float, Quantity("kg/m^3", "13534 kg/m^3", above=0.0)]
+Viscosity = Annotated[float, Quantity("Pa*s", "1.526 mPa*s", above=0.0)]
+Conductivity = Annotated[float, Quantity("S/m", "1.04e6 S/m", above=0.0)]
+Voltage = Annotated[float, Quantity("V", "10 V", above=0.0)]
+ScaleFactor = Annotated[float, Quantity("V*s/rad", "20 mV/(deg/s)", above=0.0)]
+WordScale = Annotated[float, Quantity("rad/s", "0.38 udeg/s", above=0.0)]
