@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Part(BaseModel):
     """Frozen parameters of one block of the chain; SI floats from Python, strings with units from YAML."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True, validate_default=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
 def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:

@@ -50,7 +50,7 @@ class Column(Part):
 class Recorded(Motion):
     """Rate measured elsewhere, from a CSV file with a header line, joined by a cubic spline (continuous acceleration).
 
-    Uneven or missing samples are refused with their line: a step may differ from the mean step by 0.1 %.
+    Uneven or missing samples are refused with their line: a step may differ from the median step by 0.1 %.
 
     Parameters
     ----------
@@ -110,12 +110,12 @@ class Recorded(Motion):
         if len(rows) < 4:
             self._refuse(f"expected at least 4 samples, got {len(rows)}")
         t, rate = np.array(rows).T
-        step = (t[-1] - t[0]) / (t.size - 1)
+        step = float(np.median(np.diff(t)))
         uneven = np.flatnonzero(~(np.abs(np.diff(t) - step) <= _JITTER * abs(step))) if step > 0 else np.array([0])
         if uneven.size:
             i = int(uneven[0])
             self._refuse(
-                f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the mean step is {step:g} s; resample the record",
+                f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is {step:g} s; resample the record",
                 lines[i + 1],
             )
         return t, rate

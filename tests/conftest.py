@@ -1,0 +1,24 @@
+"""What every test runs under."""
+
+from __future__ import annotations
+
+import os
+
+# Before numpy loads: the tests run side by side, one thread each.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _floating_point_errors():
+    """Overflow, division by zero and invalid operations are errors; underflow to zero is physics."""
+    with np.errstate(all="raise", under="ignore"):
+        yield
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20240308)
