@@ -9,7 +9,8 @@ import numpy as np
 from testbed.errors import ScenarioError
 from testbed.metrics import METRICS
 from testbed.models.motion import MotionProfile
-from testbed.models.turntable import required_torque
+from testbed.models.servo import required_torque
+from testbed.models.table_modes import check_modes
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.signals import random_stream
 
@@ -24,6 +25,7 @@ def cross_check(scenario: Scenario, document: Document) -> None:
     _check_times(scenario, document)
     _check_clocks(scenario, document)
     _check_expectations(scenario, document)
+    _check_plant(scenario, document)
     _check_filters(scenario, document)
     if not document.problems:
         _check_motion(scenario, document)
@@ -64,6 +66,14 @@ def _check_clocks(scenario: Scenario, document: Document) -> None:
             )
     if scenario.fusion and not scenario.sensors:
         document.find(("fusion",), "there is nothing to fuse: name at least one sensor under 'sensors:'")
+
+
+def _check_plant(scenario: Scenario, document: Document) -> None:
+    if scenario.turntable.mode == "servo":
+        try:
+            check_modes(scenario.turntable, 1.0 / BASE_RATE_HZ)
+        except ScenarioError as error:
+            document.find(("turntable",), "; ".join(problem.message for problem in error.problems))
 
 
 def _check_expectations(scenario: Scenario, document: Document) -> None:
@@ -120,10 +130,10 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
                 f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, +-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
             )
     limit = scenario.turntable.torque_limit
-    if scenario.turntable.mode != "fixed" and peak_torque > limit:
+    if scenario.turntable.mode == "servo" and peak_torque > limit:
         document.find(
             ("motion",),
-            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'fixed'",
+            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'ideal'",
         )
 
 

@@ -98,8 +98,10 @@ def view(run_dir: RunDir) -> None:
 def report(run_dir: RunDir) -> None:
     """Write the static report of a run again."""
     from testbed.report import write_report
+    from testbed.store import failing_as_run_error
 
-    typer.echo(f"wrote {write_report(run_dir)}")
+    with failing_as_run_error(str(run_dir)):
+        typer.echo(f"wrote {write_report(run_dir)}")
 
 
 def main() -> None:
@@ -111,24 +113,21 @@ def main() -> None:
         _fail(str(error), BAD_INPUT)
     except RunError as error:
         _fail(str(error), FAILED)
-    except KeyboardInterrupt:
+    except Exception as error:  # noqa: BLE001 - told apart by _usage, which raises what it does not know
+        _usage(error)
+    # The command-line library turns an interrupt into its own exit status.
+    if status == INTERRUPTED:
         _fail("interrupted; nothing was left behind", INTERRUPTED)
-    except Exception as error:  # noqa: BLE001 - told apart by _exit_of, which raises what it does not know
-        _exit_of(error)
     sys.exit(status if isinstance(status, int) else OK)
 
 
-def _exit_of(error: Exception) -> NoReturn:
-    """Exit as the command-line library asks; anything else is a fault of ours and keeps its traceback."""
+def _usage(error: Exception) -> NoReturn:
+    """Show what is wrong with the call; anything else is a fault of ours and keeps its traceback."""
     show: Callable[[], None] | None = getattr(error, "show", None)
-    if show is not None:
-        show()
-        sys.exit(BAD_INPUT)
-    if type(error).__name__ == "Abort":
-        _fail("interrupted; nothing was left behind", INTERRUPTED)
-    if isinstance(error, BrokenPipeError):
-        sys.exit(OK)
-    raise error
+    if show is None:
+        raise error
+    show()
+    sys.exit(BAD_INPUT)
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:

@@ -37,10 +37,11 @@ class RunError(RuntimeError):
 
 
 class UnknownNameError(ValueError):
-    """A name that no registry knows; the message lists the known ones and the nearest."""
+    """A name that no registry knows; the message lists the known ones and the nearest, or says why it cannot be loaded."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: str, known: Iterable[str], reason: str = "") -> None:
         names = sorted(known)
         near = difflib.get_close_matches(name, names, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = f": {reason}" if reason else hint
         super().__init__(f"unknown {kind} {name!r}{hint} (known: {', '.join(names) or 'none'})")

@@ -61,6 +61,7 @@ class _Reader:
     def __init__(self, document: Document, folder: Path) -> None:
         self._doc = document
         self._folder = folder
+        self._presets: dict[str, Any] = {"sensors": {}}
 
     def scenario(self) -> Scenario | None:
         data = dict(self._doc.data)
@@ -76,7 +77,9 @@ class _Reader:
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
-        return Scenario(frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data)
+        return Scenario(
+            frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data, self._presets
+        )
 
     def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:
         if data is None:
@@ -103,6 +106,7 @@ class _Reader:
     def _turntable(self, data: Any) -> TurntableParameters | None:
         key = ("turntable",)
         merged = self._with_preset(self._mapping(data, key), "testbed.models", key, "air_bearing")
+        self._presets["turntable"] = merged or {}
         return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
 
     def _motion(self, data: Any) -> tuple[tuple[str, Motion], ...]:
@@ -140,7 +144,9 @@ class _Reader:
             )
             if merged is None:
                 continue
-            kind = str(merged.pop("type", name))
+            self._presets["sensors"][name] = merged
+            kind = str(merged.get("type", name))
+            merged = {k: v for k, v in merged.items() if k != "type"}
             types[name] = kind
             try:
                 model = resolve("sensor", kind, SENSORS)

@@ -37,8 +37,11 @@ def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:
     module, _, attribute = target.partition(":")
     try:
         return cast("type[Any]", getattr(importlib.import_module(module), attribute))
-    except (ImportError, AttributeError) as error:
-        raise UnknownNameError(kind, name, registry) from error
+    except Exception as error:
+        # A user's own module may fail in any way; one of ours that does is our fault and keeps its traceback.
+        if ":" not in name:
+            raise
+        raise UnknownNameError(kind, name, registry, reason=f"{type(error).__name__}: {error}") from error
 
 
 def preset_names(package: str) -> list[str]:

@@ -6,21 +6,18 @@ import platform
 from contextlib import ExitStack
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 import testbed
-from testbed.errors import RunError
-from testbed.metrics import ErrorMetrics, floor_density, floor_rmse
-from testbed.pipeline import Chain, simulate
-from testbed.results import MemoryStore, Run, assemble, first_due
+from testbed.interrupt import held_interrupts
+from testbed.judge import Judge
+from testbed.pipeline import simulate
+from testbed.results import MemoryStore, Run, assemble
 from testbed.store import NetcdfStore, RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
-    from testbed.pipeline import RunBlock
     from testbed.scenario import Scenario
 
     Progress = Callable[[float], None]
@@ -80,7 +77,7 @@ def _run_in_memory(scenario: Scenario, block: float, progress: Progress | None) 
         judge.write(part)
         if progress is not None:
             progress((part.start + part.n_time) / chain.rates["base"])
-    return assemble(memory.groups(), judge.metrics())
+    return assemble(memory.groups(), {**judge.metrics(), "versions": versions()})
 
 
 def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progress | None) -> Run:
@@ -91,6 +88,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progre
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder(out))
         stack.enter_context(failing_as_run_error(str(out)))
+        check_interrupt = stack.enter_context(held_interrupts())
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain)
         attributes = {
@@ -118,97 +116,14 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progre
                 sink.write(part)
             if progress is not None:
                 progress((part.start + part.n_time) / chain.rates["base"])
+            check_interrupt()
         netcdf.close()
         recording.close()
-        write_metrics(folder.path, judge.metrics())
+        write_metrics(folder.path, {**judge.metrics(), "versions": versions()})
         write_scenario(folder.path, scenario.resolved(), versions())
         write_report(folder.path)
+        check_interrupt()
         return open_run(folder.finish())
-
-
-class Judge:
-    """Accumulates the metrics of every sensor and filter after `settle`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What runs.
-    chain : Chain
-        Its stages (for the sample rates).
-    """
-
-    def __init__(self, scenario: Scenario, chain: Chain) -> None:
-        self._scenario = scenario
-        self._rates = chain.rates
-        self._errors = {name: ErrorMetrics(scenario.lines) for name in (*scenario.sensors, *scenario.fusion)}
-
-    def write(self, block: RunBlock) -> None:
-        """Add a block."""
-        for name, readings in block.sensors.items():
-            self._add(name, block, readings, None)
-        for name, estimate in block.fusion.items():
-            self._add(name, block, estimate.rate, estimate.std)
-
-    def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> None:
-        ratio = round(self._rates["base"] / self._rates[name])
-        first = first_due(block.start, self._rates["base"], self._rates[name])
-        truth = block.truth.rate[first * ratio - block.start :: ratio]
-        settled = max(-(-round(self._scenario.frame.settle * self._rates["base"]) // ratio) - first, 0)
-        t = np.arange(first, first + rate.size)[settled:] / self._rates[name]
-        self._errors[name].add(t, rate[settled:], truth[settled:], None if std is None else std[settled:])
-
-    def metrics(self) -> dict[str, Any]:
-        """Return the content of metrics.json."""
-        frame = self._scenario.frame
-        psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
-        floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
-        floor_deg = None if floor is None else float(np.rad2deg(floor))
-        sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
-        fusion = {
-            name: {
-                **self._errors[name].result(),
-                **self._errors[name].consistency(),
-                "floor_rmse_deg_s": floor_deg,
-                "optimum_rmse_deg_s": None,
-            }
-            for name in self._scenario.fusion
-        }
-        return {
-            "scenario": self._scenario.name,
-            "seed": frame.seed,
-            "duration_s": frame.duration,
-            "settle_s": frame.settle,
-            "bandwidth_hz": frame.bandwidth,
-            "versions": versions(),
-            "sensors": sensors,
-            "fusion": fusion,
-            "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
-            "expectations": self._expectations({**sensors, **fusion}),
-        }
-
-    def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
-        rows = []
-        for bound in self._scenario.expect:
-            value = results[bound.subject].get(bound.metric)
-            rows.append(
-                {
-                    "subject": bound.subject,
-                    "metric": bound.metric,
-                    "bound": f"{bound.relation} {bound.limit:g}",
-                    "value": value,
-                    "met": bound.met(value),
-                }
-            )
-        return rows
-
-
-def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:
-    """Return the floor as a root density in deg/s/sqrt(Hz), for the report."""
-    freq = np.logspace(-3, np.log10(bandwidth), 121)
-    return {
-        "frequency_hz": freq.tolist(),
-        "density": np.rad2deg(np.sqrt(floor_density(list(psds.values()), freq))).tolist(),
-    }
 
 
 def versions() -> dict[str, str]:
@@ -218,6 +133,3 @@ def versions() -> dict[str, str]:
         "python": platform.python_version(),
         **{name: metadata.version(name) for name in _LIBRARIES},
     }
-
-
-__all__ = ["Judge", "RunError", "run", "versions"]

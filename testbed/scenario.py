@@ -87,7 +87,8 @@ class FilterSpec:
 class Scenario:
     """A validated scenario in SI.
 
-    `source` is the mapping as written in the file, with the user's units; `file` is where it stands.
+    `source` is the mapping as written in the file, with the user's units, and `presets` holds the parts that presets filled in; `file` is where
+    it stands.
     """
 
     frame: Frame
@@ -99,6 +100,7 @@ class Scenario:
     expect: tuple[Bound, ...]
     file: str
     source: Mapping[str, Any] = field(repr=False)
+    presets: Mapping[str, Any] = field(repr=False)
 
     @property
     def name(self) -> str:

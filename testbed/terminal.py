@@ -98,7 +98,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         "x floor",
         *(f"{line:g} Hz gain, phase" for line in shown),
     ):
-        table.add_column(heading, justify="left" if not heading else "right")
+        table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
     for kind in ("sensors", "fusion"):
         for name, row in metrics[kind].items():
             table.add_row(*_row(name, row, shown), end_section=name == list(metrics[kind])[-1])
@@ -125,7 +125,9 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
 def print_scenario(scenario: Scenario) -> None:
     """Print every key of a scenario: as written, and in SI."""
     console = _console()
-    written = dict(_leaves(dict(scenario.source)))
+    written = {key: f"{value} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
+        _leaves(dict(scenario.source))
+    )
     table = Table(
         "key", "as written", "understood (SI)", title=f"{scenario.name}: {scenario.file}", title_justify="left"
     )

@@ -29,7 +29,13 @@ def test_rmse_includes_the_phase():
     assert result["rmse_deg_s"] == pytest.approx(np.rad2deg(np.sqrt(1 - np.cos(phi))), rel=1e-12)
     # A pure phase error vanishes once the phase is removed; the square root of a rounding residue is left.
     assert result["rmse_aligned_deg_s"] < 1e-6
-    assert result["lines"] == [{"frequency_hz": 10.0, "gain": pytest.approx(1.0, abs=1e-12), "phase_deg": pytest.approx(np.rad2deg(phi), abs=1e-10)}]
+    assert result["lines"] == [
+        {
+            "frequency_hz": 10.0,
+            "gain": pytest.approx(1.0, abs=1e-12),
+            "phase_deg": pytest.approx(np.rad2deg(phi), abs=1e-10),
+        }
+    ]
     assert result["peak_error_deg_s"] == pytest.approx(np.rad2deg(2 * np.sin(phi / 2)), rel=1e-3)
 
 

@@ -1,0 +1,100 @@
+"""The metrics of a run: every sensor and filter against the truth, beside what no filter can get below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from testbed.metrics import ErrorMetrics, floor_density, floor_rmse
+from testbed.results import first_due
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.pipeline import Chain, RunBlock
+    from testbed.scenario import Scenario
+
+
+class Judge:
+    """Accumulates the metrics of every sensor and filter after `settle`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What runs.
+    chain : Chain
+        Its stages (for the sample rates).
+    """
+
+    def __init__(self, scenario: Scenario, chain: Chain) -> None:
+        self._scenario = scenario
+        self._rates = chain.rates
+        self._errors = {name: ErrorMetrics(scenario.lines) for name in (*scenario.sensors, *scenario.fusion)}
+
+    def write(self, block: RunBlock) -> None:
+        """Add a block."""
+        for name, readings in block.sensors.items():
+            self._add(name, block, readings, None)
+        for name, estimate in block.fusion.items():
+            self._add(name, block, estimate.rate, estimate.std)
+
+    def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> None:
+        ratio = round(self._rates["base"] / self._rates[name])
+        first = first_due(block.start, self._rates["base"], self._rates[name])
+        truth = block.truth.rate[first * ratio - block.start :: ratio]
+        settled = max(-(-round(self._scenario.frame.settle * self._rates["base"]) // ratio) - first, 0)
+        t = np.arange(first, first + rate.size)[settled:] / self._rates[name]
+        self._errors[name].add(t, rate[settled:], truth[settled:], None if std is None else std[settled:])
+
+    def metrics(self) -> dict[str, Any]:
+        """Return the content of metrics.json."""
+        frame = self._scenario.frame
+        psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
+        floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
+        floor_deg = None if floor is None else float(np.rad2deg(floor))
+        sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
+        fusion = {
+            name: {
+                **self._errors[name].result(),
+                **self._errors[name].consistency(),
+                "floor_rmse_deg_s": floor_deg,
+                "optimum_rmse_deg_s": None,
+            }
+            for name in self._scenario.fusion
+        }
+        return {
+            "scenario": self._scenario.name,
+            "seed": frame.seed,
+            "duration_s": frame.duration,
+            "settle_s": frame.settle,
+            "bandwidth_hz": frame.bandwidth,
+            "sensors": sensors,
+            "fusion": fusion,
+            "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
+            "expectations": self._expectations({**sensors, **fusion}),
+        }
+
+    def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
+        rows = []
+        for bound in self._scenario.expect:
+            value = results[bound.subject].get(bound.metric)
+            rows.append(
+                {
+                    "subject": bound.subject,
+                    "metric": bound.metric,
+                    "bound": f"{bound.relation} {bound.limit:g}",
+                    "value": value,
+                    "met": bound.met(value),
+                }
+            )
+        return rows
+
+
+def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:
+    """Return the floor as a root density in deg/s/sqrt(Hz), for the report."""
+    freq = np.logspace(-3, np.log10(bandwidth), 121)
+    return {
+        "frequency_hz": freq.tolist(),
+        "density": np.rad2deg(np.sqrt(floor_density(list(psds.values()), freq))).tolist(),
+    }

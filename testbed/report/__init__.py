@@ -1,0 +1,105 @@
+"""The static report of a run: one HTML page with its table, figures, scenario and definitions, that needs nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from testbed.errors import Problem, ScenarioError
+from testbed.palette import series_colors
+from testbed.report.digest import Digest, digest_run
+from testbed.report.figures import errors_figure, rates_figure, spectrum_figure
+from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
+from testbed.report.numbers import fixed, plain, significant
+from testbed.report.svg import svg_text
+from testbed.report.words import METRICS, further, honesty, ratio_to_floor, summary
+from testbed.store import write_text
+
+REPORT = "report.html"
+
+
+def write_report(run_dir: Path) -> Path:
+    """Write ``report.html`` from ``run.nc``, ``metrics.json`` and ``scenario.yaml`` of a finished run folder.
+
+    Signals are read in blocks, so that memory does not grow with the duration. The page is written beside and renamed: an earlier one stays
+    whole until the new one is.
+
+    Parameters
+    ----------
+    run_dir : Path
+        Run folder.
+
+    Returns
+    -------
+    Path
+        The report.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder lacks a file, or a file is damaged; names it and what was expected.
+    """
+    run_dir = Path(run_dir)
+    if not run_dir.is_dir():
+        message = "expected a run folder (run.nc, metrics.json, scenario.yaml), got none"
+        raise ScenarioError([Problem(message, file=str(run_dir))])
+    metrics = read_metrics(run_dir / "metrics.json")
+    scenario = read_text(run_dir / "scenario.yaml", "the resolved scenario (YAML text)")
+    with open_run(run_dir / "run.nc") as data:
+        digest = digest_run(data, metrics)
+    write_text(run_dir / REPORT, _render(metrics, scenario, digest))
+    return run_dir / REPORT
+
+
+def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
+    environment = Environment(
+        loader=PackageLoader("testbed.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
+    environment.globals |= {"ratio_to_floor": ratio_to_floor, "honesty": honesty}
+    return environment.get_template("report.html.j2").render(
+        metrics=metrics,
+        names=_shown_metrics(metrics),
+        line_sources=_line_sources(metrics),
+        further=further(metrics),
+        summary=summary(metrics, digest),
+        scenario=scenario,
+        digest=digest,
+        figures=_figures(metrics, digest),
+    )
+
+
+def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
+    """Return the columns of the error table; peak error and optimum only where they are known."""
+    sources = [*metrics.sensors.values(), *metrics.fusion.values()]
+    unknown = [
+        key
+        for key in ("peak_error_deg_s", "optimum_rmse_deg_s")
+        if all(getattr(source, key) is None for source in sources)
+    ]
+    return {key: name for key, name in METRICS.items() if key not in unknown}
+
+
+def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
+    """Return the lines of each source that has any, by frequency [Hz]."""
+    sources = {**metrics.sensors, **metrics.fusion}
+    return {
+        name: {line.frequency_hz: line for line in source.lines} for name, source in sources.items() if source.lines
+    }
+
+
+def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Markup]:
+    colors = series_colors(list(metrics.sensors), list(metrics.fusion))
+    drawn = {"rates": rates_figure(digest, colors)}
+    if digest.filter_errors:
+        drawn["errors"] = errors_figure(digest, colors)
+    drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
+    # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
+    return {name: Markup(svg_text(figure, name)) for name, figure in drawn.items()}

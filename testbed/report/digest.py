@@ -1,0 +1,171 @@
+"""What the figures show, gathered from ``run.nc`` in one pass over each signal with memory flat in duration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.report.envelope import Envelope
+from testbed.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
+
+if TYPE_CHECKING:
+    from testbed.report.folder import RunData, RunMetrics, Signal
+    from testbed.signals import FloatArray
+
+BLOCK = 2**18
+# More than a page has columns; few enough for a figure of some 100 kB.
+N_BINS = 700
+# A constant error leaks into the first two bins of a Hann window; from the third on the spectrum is free of it.
+FIRST_FREQ = 2
+
+
+@dataclass(frozen=True)
+class RateTrace:
+    """A rate [rad/s] over the whole run and in the zoom."""
+
+    whole: Envelope
+    zoom: Envelope
+
+
+@dataclass(frozen=True)
+class ErrorTrace:
+    """An error against the truth [rad/s].
+
+    `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error| <= 2 std; None for a sensor.
+    `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short.
+    """
+
+    whole: Envelope
+    std: Envelope | None
+    inside: float | None
+    freq_hz: FloatArray
+    density: FloatArray
+    n_segments: int
+
+
+@dataclass(frozen=True)
+class Digest:
+    """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter."""
+
+    duration_s: float
+    settle_s: float
+    zoom_s: tuple[float, float]
+    line_freq_hz: list[float]
+    rates: dict[str, RateTrace]
+    sensor_errors: dict[str, ErrorTrace]
+    filter_errors: dict[str, ErrorTrace]
+
+
+def zoom_window(metrics: RunMetrics) -> tuple[float, float]:
+    """Return (start, stop) [s] of the zoom: two periods of the slowest line, or 1 s, from settle on, as far as the run reaches."""
+    lines = [freq for freq in metrics.line_freq_hz if freq > 0]
+    length = 2.0 / lines[0] if lines else 1.0
+    return metrics.settle_s, min(metrics.settle_s + length, metrics.duration_s)
+
+
+def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
+    """Gather what the figures show.
+
+    Parameters
+    ----------
+    data : RunData
+        Open ``run.nc``.
+    metrics : RunMetrics
+        The run's metrics: names of sensors and filters, settle and lines.
+
+    Returns
+    -------
+    Digest
+        Traces [rad/s] and densities [rad^2/s^2/Hz].
+
+    Raises
+    ------
+    ScenarioError
+        If ``run.nc`` lacks a signal that ``metrics.json`` names, or its units or time base are wrong.
+    """
+    zoom = zoom_window(metrics)
+    truth = data.signal("truth", "rate")
+    rates = {}
+    for group in ("commanded", "truth"):
+        signal = data.signal(group, "rate")
+        trace = _rate_trace(signal, zoom)
+        for first in range(0, signal.n_time, BLOCK):
+            _add_rate(trace, first, signal.read(first, min(first + BLOCK, signal.n_time)))
+        rates[group] = trace
+    errors = {}
+    for group in [f"sensors/{name}" for name in metrics.sensors] + [f"fusion/{name}" for name in metrics.fusion]:
+        rates[group], errors[group] = _follow(data, group, truth, metrics.settle_s, zoom)
+    return Digest(
+        duration_s=metrics.duration_s,
+        settle_s=metrics.settle_s,
+        zoom_s=zoom,
+        line_freq_hz=[freq for freq in metrics.line_freq_hz if freq > 0],
+        rates=rates,
+        sensor_errors={name: errors[f"sensors/{name}"] for name in metrics.sensors},
+        filter_errors={name: errors[f"fusion/{name}"] for name in metrics.fusion},
+    )
+
+
+def _rate_trace(signal: Signal, zoom: tuple[float, float]) -> RateTrace:
+    fs = signal.sample_rate_hz
+    start, stop = min(round(zoom[0] * fs), signal.n_time - 1), min(round(zoom[1] * fs) + 1, signal.n_time)
+    return RateTrace(Envelope(0, signal.n_time, fs, N_BINS), Envelope(start, stop, fs, N_BINS))
+
+
+def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
+    trace.whole.process(first, rate)
+    trace.zoom.process(first, rate)
+
+
+def _follow(
+    data: RunData, group: str, truth: Signal, settle_s: float, zoom: tuple[float, float]
+) -> tuple[RateTrace, ErrorTrace]:
+    """Read one sensor or filter beside the truth."""
+    signal = data.signal(group, "rate")
+    std = data.signal(group, "std") if group.startswith("fusion/") else None
+    stride, fs = data.stride(group, signal, truth), signal.sample_rate_hz
+    settle = min(int(np.ceil(settle_s * fs - 1e-6)), signal.n_time)
+    n_segment = segment_length(signal.n_time - settle)
+    welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
+    trace = _rate_trace(signal, zoom)
+    whole, band = Envelope(0, signal.n_time, fs, N_BINS), Envelope(0, signal.n_time, fs, N_BINS)
+    n_inside, n_judged = 0, 0
+    n_block = max(1, BLOCK // stride)
+    for first in range(0, signal.n_time, n_block):
+        stop = min(first + n_block, signal.n_time)
+        rate = signal.read(first, stop)
+        error = rate - truth.read(first * stride, (stop - 1) * stride + 1)[::stride]
+        settled = max(settle - first, 0)
+        _add_rate(trace, first, rate)
+        whole.process(first, error)
+        if welch is not None:
+            welch.process(error[settled:])
+        if std is not None:
+            sigma = std.read(first, stop)
+            band.process(first, sigma)
+            inside, judged = _count_inside(error[settled:], sigma[settled:])
+            n_inside, n_judged = n_inside + inside, n_judged + judged
+    freq_hz, density = _plotted(welch)
+    return trace, ErrorTrace(
+        whole=whole,
+        std=None if std is None else band,
+        inside=n_inside / n_judged if n_judged else None,
+        freq_hz=freq_hz,
+        density=density,
+        n_segments=0 if welch is None else welch.n_segments,
+    )
+
+
+def _count_inside(error: FloatArray, sigma: FloatArray) -> tuple[int, int]:
+    """Return the number of samples with |error| <= 2 sigma and of those where both are defined."""
+    judged = np.isfinite(error) & np.isfinite(sigma)
+    inside = np.abs(error[judged]) <= 2.0 * sigma[judged]
+    return int(np.count_nonzero(inside)), int(np.count_nonzero(judged))
+
+
+def _plotted(welch: WelchDensity | None) -> tuple[FloatArray, FloatArray]:
+    if welch is None or welch.n_segments == 0:
+        return np.empty(0), np.empty(0)
+    return log_average(welch.freq_hz[FIRST_FREQ:], welch.density[FIRST_FREQ:])

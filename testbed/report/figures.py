@@ -1,0 +1,255 @@
+"""The three figures of a report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from testbed.report.numbers import plain, significant
+from testbed.report.svg import INK, STYLE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+
+    from testbed.report.digest import Digest, ErrorTrace
+    from testbed.report.envelope import Envelope
+    from testbed.report.folder import FloorDensity
+
+WIDTH_IN = 9.2
+MAX_LABELLED_LINES = 6
+DOTTED = (0, (1.2, 2.2))
+# Beside the color, so that lines can be told apart without it.
+DASHES: tuple[tuple[float, tuple[float, ...] | None], ...] = (
+    (0, None),
+    (0, (7, 1.5)),
+    (0, (3, 1.2)),
+    (0, (7, 1.2, 1.5, 1.2)),
+)
+
+
+def _draw(axes: Axes, envelope: Envelope, color: str, width: float, alpha: float = 1.0) -> None:
+    """Fill between the extremes, with an outline so that a quiet signal is still a line."""
+    low, high = np.degrees(envelope.low), np.degrees(envelope.high)
+    axes.fill_between(
+        envelope.time, low, high, facecolor=color, edgecolor=color, linewidth=width, alpha=alpha, joinstyle="round"
+    )
+
+
+def _legend(figure: Figure, handles: list[Line2D | Patch]) -> None:
+    """Put the legend above the axes, in equal rows as wide as its longest name allows."""
+    entry_pt = 45.0 + 5.4 * max(len(str(handle.get_label())) for handle in handles)
+    n_rows = -(-len(handles) // max(1, int(72.0 * WIDTH_IN / entry_pt)))
+    figure.legend(handles=handles, loc="outside upper left", ncols=-(-len(handles) // n_rows))
+
+
+def _label(group: str) -> str:
+    """Return the instance's name; a dollar sign would start a formula."""
+    return group.split("/", 1)[-1].replace("$", r"\$")
+
+
+def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
+    """Draw the rates: the whole run above, a zoom below.
+
+    Parameters
+    ----------
+    digest : Digest
+        Traces of the run.
+    colors : Mapping
+        Group (``truth``, ``sensors/mhd_ars``, ...) to color.
+
+    Returns
+    -------
+    Figure
+        Two axes, deg/s against s.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
+        above, below = figure.subplots(2, 1, height_ratios=[2, 3])
+        sensors = [group for group in digest.rates if group.startswith("sensors/")]
+        filters = [group for group in digest.rates if group.startswith("fusion/")]
+        # Later lines are thinner, so that lines which lie on each other all stay visible.
+        widths = {"truth": 4.2, **dict.fromkeys(sensors, 1.4)}
+        widths |= {group: 2.2 * 0.7**i for i, group in enumerate(filters)}
+        for group in [*sensors, "truth"]:
+            _draw(above, digest.rates[group].whole, colors[group], 0.9)
+        for group, width in widths.items():
+            _draw(below, digest.rates[group].zoom, colors[group], width)
+        commanded = digest.rates["commanded"].zoom
+        middle = np.degrees((commanded.low + commanded.high) / 2)
+        below.plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
+        above.axvspan(*digest.zoom_s, color=INK, alpha=0.08, linewidth=0)
+        above.set_title("Whole run (shaded: the zoom below)", loc="left")
+        below.set_title(f"Zoom, {plain(digest.zoom_s[0])} s to {plain(digest.zoom_s[1])} s", loc="left")
+        above.set_xlim(0, digest.duration_s)
+        below.set_xlim(*digest.zoom_s)
+        for axes in (above, below):
+            axes.set_ylabel("rate [deg/s]")
+            axes.grid(visible=True)
+        below.set_xlabel("time [s]")
+        handles: list[Line2D | Patch] = [
+            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=_label(group))
+            for group, width in widths.items()
+        ]
+        dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
+        _legend(figure, [dotted, *handles])
+    return figure
+
+
+def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
+    """Draw the error of each filter over time in a panel of its own, with the band of two standard deviations it predicts.
+
+    Parameters
+    ----------
+    digest : Digest
+        Traces of the run.
+    colors : Mapping
+        Group (``fusion/kalman``, ...) to color.
+
+    Returns
+    -------
+    Figure
+        One axes for each filter, deg/s against s.
+    """
+    errors = digest.filter_errors
+    limits = _common_limits({name: _settled_extreme(trace, digest.settle_s) for name, trace in errors.items()})
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.7 * len(errors)), layout="constrained")
+        panels = figure.subplots(len(errors), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (name, trace) in zip(panels, errors.items(), strict=True):
+            _error_panel(axes, trace, colors[f"fusion/{name}"], limits[name])
+            axes.axvspan(0, digest.settle_s, color=INK, alpha=0.08, linewidth=0)
+            inside = "undefined" if trace.inside is None else f"{100 * trace.inside:.1f} %"
+            axes.set_title(
+                f"{_label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
+            )
+        panels[-1].set_xlabel("time [s]")
+        panels[-1].set_xlim(0, digest.duration_s)
+        handles: list[Line2D | Patch] = [
+            Patch(facecolor="#8a8a8a", label="error (its extremes)"),
+            Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (5, 2)), label="±2 std predicted"),
+        ]
+        if digest.settle_s > 0:
+            handles.append(Patch(facecolor=INK, alpha=0.08, label="before settle, not judged"))
+        _legend(figure, handles)
+    return figure
+
+
+def _error_panel(axes: Axes, trace: ErrorTrace, color: str, limit: float) -> None:
+    _draw(axes, trace.whole, color, 0.6)
+    if trace.std is not None:
+        for sign in (-2.0, 2.0):
+            band = sign * np.degrees(trace.std.high)
+            axes.plot(trace.std.time, band, color=INK, linewidth=1.1, linestyle=(0, (5, 2)))
+    axes.set_ylim(-limit, limit)
+    axes.set_ylabel("error [deg/s]")
+    axes.grid(visible=True)
+
+
+def _settled_extreme(trace: ErrorTrace, settle_s: float) -> float:
+    """Return the largest |error| and 2 std after settle [deg/s]; the start-up must not set the scale."""
+    settled = trace.whole.time >= settle_s
+    values = [np.abs(trace.whole.low[settled]), np.abs(trace.whole.high[settled])]
+    if trace.std is not None:
+        values.append(2.0 * trace.std.high[settled])
+    finite = np.concatenate(values)
+    finite = finite[np.isfinite(finite)]
+    return float(np.degrees(finite.max())) if finite.size else 0.0
+
+
+def _common_limits(extremes: Mapping[str, float]) -> dict[str, float]:
+    """Return the half height of each panel [deg/s]: the same for all whose extremes lie within a factor of four of the next."""
+    limits: dict[str, float] = {}
+    previous, shared = 0.0, 0.0
+    for name, extreme in sorted(extremes.items(), key=lambda item: -item[1]):
+        shared = shared if previous and extreme > previous / 4 else 1.15 * extreme
+        limits[name], previous = shared or 1.0, extreme
+    return limits
+
+
+def _cut_note(trace: ErrorTrace, limit: float) -> str:
+    highest = np.fmax.reduce(np.fmax(np.abs(trace.whole.low), np.abs(trace.whole.high)))
+    reached = float(np.degrees(highest))
+    return f" (start-up reaches {significant(reached, 2)} deg/s)" if reached > limit else ""
+
+
+def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensity | None) -> Figure:
+    """Draw the two-sided root density of the errors after settle, and of the noise floor if it is known.
+
+    Parameters
+    ----------
+    digest : Digest
+        Traces of the run.
+    colors : Mapping
+        Group (``sensors/mhd_ars``, ``fusion/kalman``, ...) to color.
+    floor : FloorDensity or None
+        Root density of the floor [deg/s/sqrt(Hz)].
+
+    Returns
+    -------
+    Figure
+        One axes, log-log, deg/s/sqrt(Hz) against Hz.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 4.6), layout="constrained")
+        axes = figure.subplots()
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        handles: list[Line2D | Patch] = []
+        for kind, width, errors in (("sensors", 0.9, digest.sensor_errors), ("fusion", 1.9, digest.filter_errors)):
+            for i, (name, trace) in enumerate(errors.items()):
+                shown = trace.density > 0
+                root = np.degrees(np.sqrt(trace.density[shown]))
+                handles += axes.plot(
+                    trace.freq_hz[shown],
+                    root,
+                    color=colors[f"{kind}/{name}"],
+                    linewidth=width,
+                    linestyle=DASHES[i % len(DASHES)],
+                    label=_label(name),
+                )
+        if floor is not None:
+            handles += axes.plot(
+                floor.frequency_hz,
+                floor.density,
+                color=INK,
+                linewidth=1.5,
+                linestyle=(0, (1, 1.2)),
+                label="noise floor",
+            )
+        _frame_spectrum(axes, digest)
+        _legend(figure, handles)
+    return figure
+
+
+def _frame_spectrum(axes: Axes, digest: Digest) -> None:
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("error root density, two-sided [deg/s/√Hz]")
+    axes.xaxis.set_major_locator(LogLocator(numticks=20))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.grid(visible=True)
+    shown = [
+        trace.freq_hz
+        for trace in [*digest.sensor_errors.values(), *digest.filter_errors.values()]
+        if trace.freq_hz.size
+    ]
+    if shown:
+        axes.set_xlim(0.8 * min(freq[0] for freq in shown), 1.25 * max(freq[-1] for freq in shown))
+    low, high = axes.get_xlim()
+    lines = [freq for freq in digest.line_freq_hz if low <= freq <= high]
+    for freq in lines:
+        axes.axvline(freq, color=INK, linewidth=0.8, alpha=0.45, linestyle=(0, (1, 2)), zorder=0.5)
+    for freq in lines if len(lines) <= MAX_LABELLED_LINES else []:
+        axes.annotate(
+            f"{plain(freq)} Hz", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
+            textcoords="offset points", ha="center", fontsize=8,
+        )  # fmt: skip

@@ -1,0 +1,120 @@
+"""The run in words: the summary on top of a report and the names of its metrics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from testbed.report.numbers import plain, significant
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.report.digest import Digest
+    from testbed.report.folder import RunMetrics, SourceMetrics
+
+METRICS = {
+    "rmse_deg_s": "RMSE",
+    "rmse_aligned_deg_s": "aligned RMSE",
+    "peak_error_deg_s": "peak error",
+    "floor_rmse_deg_s": "noise floor",
+    "ratio": "RMSE / floor",
+    "optimum_rmse_deg_s": "optimum",
+    "mean_std_deg_s": "predicted std",
+}
+
+
+def _best(sources: Mapping[str, SourceMetrics]) -> str | None:
+    rmse = {name: source.rmse_deg_s for name, source in sources.items() if source.rmse_deg_s is not None}
+    return min(rmse, key=lambda name: rmse[name]) if rmse else None
+
+
+def ratio_to_floor(source: SourceMetrics) -> float | None:
+    """Return RMSE over floor [-], None where either is undefined or the floor is zero."""
+    if source.rmse_deg_s is None or not source.floor_rmse_deg_s:
+        return None
+    return source.rmse_deg_s / source.floor_rmse_deg_s
+
+
+def summary(metrics: RunMetrics, digest: Digest) -> str:
+    """Return the paragraph that says what came out: the best filter, against the sensors and the floor, its honesty, the expectations."""
+    parts = [
+        f"The run lasted {plain(metrics.duration_s)} s; everything is judged from {plain(metrics.settle_s)} s on.",
+        *_accuracy(metrics),
+        *_honesty(metrics, digest),
+        _expectations(metrics),
+    ]
+    return " ".join(parts)
+
+
+def _accuracy(metrics: RunMetrics) -> list[str]:
+    best, sensor = _best(metrics.fusion), _best(metrics.sensors)
+    if best is None:
+        return ["No filter has a defined error."]
+    rmse = metrics.fusion[best].rmse_deg_s or 0.0
+    among = (
+        f"Of {len(metrics.fusion)} filters {best} is the most accurate"
+        if len(metrics.fusion) > 1
+        else f"The filter {best} was run"
+    )
+    text = [f"{among}: its error is {significant(rmse)} deg/s rms, phase included."]
+    alone = metrics.sensors[sensor].rmse_deg_s if sensor else None
+    if alone is not None and rmse > 0:
+        factor = alone / rmse
+        compared = f"{significant(factor)} times smaller" if factor >= 1 else f"{significant(1 / factor)} times larger"
+        text.append(
+            f"That is {compared} than the error of the best sensor alone ({sensor}, {significant(alone)} deg/s)."
+        )
+    ratio = ratio_to_floor(metrics.fusion[best])
+    if ratio is not None:
+        known = (
+            "which no filter of an unknown signal can get below"
+            if ratio >= 1
+            else "so what it assumes of the signal pays here"
+        )
+        text.append(f"It is {significant(ratio)} times the noise floor, {known}.")
+    return text
+
+
+def _honesty(metrics: RunMetrics, digest: Digest) -> list[str]:
+    best = _best(metrics.fusion)
+    inside = digest.filter_errors[best].inside if best else None
+    if inside is None:
+        return []
+    share = f"{100 * inside:.1f} % of its errors lie inside ±2 std, 95.4 % would if they were Gaussian with that std"
+    return [f"Its own standard deviation {honesty(inside)}: {share}."]
+
+
+def honesty(inside: float) -> str:
+    """Return what a share `inside` of errors within two standard deviations says about a filter's own std (95.4 % if Gaussian)."""
+    if inside < 0.90:
+        return "is too small for the error it makes"
+    if inside > 0.99:
+        return "is larger than the error it makes"
+    return "agrees with the error it makes"
+
+
+def _expectations(metrics: RunMetrics) -> str:
+    n_all, n_met = len(metrics.expectations), sum(item.met for item in metrics.expectations)
+    if n_all == 0:
+        return "The scenario states no expectation."
+    if n_met == n_all:
+        return (
+            "The one expectation of the scenario was met."
+            if n_all == 1
+            else f"All {n_all} expectations of the scenario were met."
+        )
+    missed = ", ".join(f"{item.subject} {item.metric} {item.bound}" for item in metrics.expectations if not item.met)
+    return f"{n_all - n_met} of {n_all} expectations of the scenario missed: {missed}."
+
+
+def further(metrics: RunMetrics) -> dict[str, dict[str, Any]]:
+    """Return the numbers of ``metrics.json`` that the tables do not show, by source."""
+    found = {}
+    for name, source in {**metrics.sensors, **metrics.fusion}.items():
+        extra = source.model_extra or {}
+        numbers = {
+            key: value for key, value in extra.items() if isinstance(value, int | float) and not isinstance(value, bool)
+        }
+        if numbers:
+            found[name] = numbers
+    return found

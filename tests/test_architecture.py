@@ -1,0 +1,107 @@
+"""The house: imports point one way, registries are complete, docstrings say what an engineer needs."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import re
+from pathlib import Path
+
+import pytest
+
+import testbed
+from testbed.parts import Part
+
+ROOT = Path(testbed.__file__).parent
+FOUNDATION = {"errors", "parts", "units", "signals"}
+# Each room and what it may import of the house, besides the foundation and itself.
+ROOMS = {"models": set(), "sensors": {"models"}, "fusion": set()}
+MODULES = sorted(path for path in ROOT.rglob("*.py"))
+
+
+def imports_of(path):
+    """Yield the names below `testbed` that a module imports, at any depth of its code."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "testbed":
+            parts = node.module.split(".")
+            yield from [parts[1]] if len(parts) > 1 else [alias.name for alias in node.names]
+        elif isinstance(node, ast.Import):
+            yield from [alias.name.split(".")[1] for alias in node.names if alias.name.startswith("testbed.")]
+
+
+def room_of(path):
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in ROOMS], ids=lambda p: str(p.relative_to(ROOT)))
+def test_rooms_import_one_way(path):
+    """signals <- models <- sensors; fusion knows neither, so the truth cannot leak into a filter."""
+    room = room_of(path)
+    assert set(imports_of(path)) <= FOUNDATION | ROOMS[room] | {room}
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("name", sorted(FOUNDATION))
+def test_the_foundation_knows_no_room(name):
+    assert set(imports_of(ROOT / f"{name}.py")) <= FOUNDATION
+
+
+def test_the_import_check_sees_a_planted_leak(tmp_path):
+    leak = tmp_path / "leak.py"
+    leak.write_text("def process():\n    from testbed.models.turntable import Turntable\n    import testbed.pipeline\n")
+    assert set(imports_of(leak)) == {"models", "pipeline"}
+
+
+def public_callables():
+    """Yield every public function and class of the package with its module, methods included."""
+    for info in pkgutil.walk_packages(testbed.__path__, "testbed."):
+        if info.name.endswith("__main__"):
+            continue
+        module = importlib.import_module(info.name)
+        for name, item in vars(module).items():
+            if name.startswith("_") or getattr(item, "__module__", None) != info.name or info.name == "testbed.cli":
+                continue
+            if inspect.isclass(item) or inspect.isfunction(item):
+                yield f"{info.name}.{name}", item
+
+
+CALLABLES = dict(public_callables())
+
+
+def documented(doc, argument):
+    """Return whether a numpydoc section has an entry for `argument`, alone or in a list of names."""
+    return re.search(rf"^\s*(?:[\w*]+, )*\*{{0,2}}{re.escape(argument)}(?:, [\w*]+)* : ", doc, re.MULTILINE) is not None
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("name", sorted(CALLABLES))
+def test_docstring_names_every_argument(name):
+    """Functions whose docstring has a Parameters section must name all arguments; every public thing has a docstring."""
+    item = CALLABLES[name]
+    doc = inspect.getdoc(item) or ""
+    assert doc, "no docstring"
+    function = item.__init__ if inspect.isclass(item) else item
+    if "Parameters\n---" not in doc or not inspect.isfunction(inspect.unwrap(function)):
+        return
+    arguments = [p for p in inspect.signature(function).parameters if p not in {"self", "data", "args", "kwargs"} and not p.startswith("_")]
+    assert [argument for argument in arguments if not documented(doc, argument)] == []
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("name", [name for name in sorted(CALLABLES) if inspect.isclass(CALLABLES[name]) and issubclass(CALLABLES[name], Part)])
+def test_docstring_of_a_parameter_set_names_every_field(name):
+    """What `testbed list` and the schema offer is explained where it is defined; inherited fields where they are inherited from."""
+    item = CALLABLES[name]
+    doc = "\n".join(inspect.getdoc(base) or "" for base in item.__mro__ if hasattr(base, "model_fields"))
+    assert [field for field in item.model_fields if not documented(doc, field)] == []
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("name", [name for name in sorted(CALLABLES) if "ndarray" in (inspect.getdoc(CALLABLES[name]) or "")])
+def test_docstring_of_an_array_has_its_shape(name):
+    for line in (inspect.getdoc(CALLABLES[name]) or "").splitlines():
+        if re.search(r"\bndarray\b", line) and " : " in line:
+            assert "shape" in line, line
