@@ -1,0 +1,39 @@
+"""Instruments: what each sensor would indicate, with its noise, its range and its word length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from testbed.parts import preset, resolve
+
+if TYPE_CHECKING:
+    from testbed.sensors.base import Sensor
+
+SENSORS = {
+    "mems_gyro": "testbed.sensors.mems_gyro:MemsGyro",
+    "mhd_ars": "testbed.sensors.mhd_ars:MhdArs",
+}
+
+
+def load_preset(name: str) -> Sensor:
+    """Return a shipped instrument by its name, such as ``sx300``.
+
+    Parameters
+    ----------
+    name : str
+        Name of a preset in ``testbed/sensors/presets``.
+
+    Returns
+    -------
+    Sensor
+        Of the type that the preset names.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such preset; the message gives the nearest name and the known ones.
+    """
+    content = preset(__name__, name)
+    values = {key: value for key, value in content.items() if key != "type"}
+    model = resolve("sensor", content["type"], SENSORS)
+    return cast("Sensor", model.model_validate(values, context={"border": True}))

@@ -1,0 +1,199 @@
+"""What every instrument has in common: parameters that can be started, a stage in time, clock and converter."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from testbed.models.turntable_parameters import Mounting
+from testbed.parts import Part
+from testbed.units import Frequency
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from testbed.signals import ComplexArray, FloatArray
+
+
+class SensorStage(Protocol):
+    """An instrument in time; state is kept, so any division into blocks gives the same bits."""
+
+    def process(self, true_rate: FloatArray) -> FloatArray:
+        """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
+
+
+class Sensor(Part):
+    """Parameters of an instrument, which is what a scenario's `sensors` entry sets.
+
+    Parameters
+    ----------
+    sample_rate : float
+        Rate of the readings [Hz]; reading j is at t = j / sample_rate.
+    noise : bool
+        Off: no noise terms and no rounding, so that a run can be exact; the dynamics and the range stay.
+    mounting : Mounting
+        Where it sits on the table and how far its axis is off.
+    """
+
+    sample_rate: Frequency
+    noise: bool = True
+    mounting: Mounting = Mounting()
+
+    @abstractmethod
+    def response(self, freq_hz: ArrayLike) -> ComplexArray:
+        """Return indicated over true rate, noise-free, in continuous time.
+
+        Parameters
+        ----------
+        freq_hz : array_like, shape (n_freq,)
+            Frequency [Hz].
+
+        Returns
+        -------
+        ndarray of complex, shape (n_freq,)
+            Response [-].
+        """
+
+    @abstractmethod
+    def full_scale(self) -> float:
+        """Return the largest rate that it can read [rad/s]."""
+
+    @abstractmethod
+    def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the noise referred to the true rate, rounding included, noise folded in by the sampling not.
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequency, above zero [Hz].
+
+        Returns
+        -------
+        ndarray, shape (n_freq,)
+            Two-sided density [rad^2/s].
+        """
+
+    @abstractmethod
+    def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
+        """Return the instrument at rest.
+
+        Parameters
+        ----------
+        input_rate_hz : float
+            Sample rate of the true rate, a whole multiple of `sample_rate` [Hz].
+        seed : int
+            Seed of the run.
+        name : str
+            Name of the instance, the owner of its random streams.
+
+        Returns
+        -------
+        SensorStage
+            ``process(true_rate)`` gives the readings [rad/s].
+
+        Raises
+        ------
+        ValueError
+            If the sample rates are no whole multiples.
+        """
+
+    def sample(self, rate: FloatArray, input_rate_hz: float, seed: int = 0) -> FloatArray:
+        """Return the readings over a whole record.
+
+        Parameters
+        ----------
+        rate : array_like, shape (n_time,)
+            True rate about the sensing axis [rad/s].
+        input_rate_hz : float
+            Its sample rate [Hz].
+        seed : int, optional
+            Seed of the noise.
+
+        Returns
+        -------
+        ndarray, shape (ceil(n_time / ratio),)
+            Readings [rad/s].
+
+        Raises
+        ------
+        ValueError
+            If `rate` is no vector or the sample rates are no whole multiples.
+        """
+        record = np.asarray(rate, dtype=np.float64)
+        if record.ndim != 1:
+            msg = f"rate: expected shape (n_time,), got {record.shape}"
+            raise ValueError(msg)
+        return self.start(input_rate_hz, seed, "sensor").process(record)
+
+
+def rate_ratio(input_rate_hz: float, sample_rate_hz: float) -> int:
+    """Return the whole number of input samples per reading.
+
+    Parameters
+    ----------
+    input_rate_hz, sample_rate_hz : float
+        Rates of the input and of the readings [Hz].
+
+    Returns
+    -------
+    int
+        Their ratio [-].
+
+    Raises
+    ------
+    ValueError
+        If the ratio is no whole number of at least one.
+    """
+    ratio = round(input_rate_hz / sample_rate_hz)
+    if ratio < 1 or abs(ratio * sample_rate_hz - input_rate_hz) > 1e-9 * input_rate_hz:
+        msg = f"sample_rate: expected {input_rate_hz:g} Hz over a whole number, got {sample_rate_hz:g} Hz"
+        raise ValueError(msg)
+    return ratio
+
+
+def rounding_psd(step: float, sample_rate_hz: float) -> float:
+    """Return the two-sided density step^2 / (12 fs) [rad^2/s] of rounding to `step` [rad/s] at fs [Hz]."""
+    return step**2 / 12.0 / sample_rate_hz
+
+
+class Decimator:
+    """Takes every `ratio`-th sample, beginning with the first, across blocks of any length."""
+
+    def __init__(self, ratio: int) -> None:
+        self._ratio, self._skip = ratio, 0
+
+    def process(self, samples: FloatArray) -> FloatArray:
+        """Return the samples of this block that the clock takes, unit of `samples`."""
+        taken = samples[self._skip :: self._ratio]
+        self._skip = (self._skip - samples.size) % self._ratio
+        return taken
+
+
+class Converter:
+    """Range and word of an analogue-to-digital converter in units of the reading.
+
+    Parameters
+    ----------
+    step : float
+        One count [rad/s].
+    bits : int
+        Word length, two's complement [-].
+    limit : float
+        Range, symmetric [rad/s].
+    rounding : bool
+        Off: the range alone.
+    """
+
+    def __init__(self, step: float, bits: int, limit: float, *, rounding: bool) -> None:
+        self._step, self._limit, self._rounding = step, limit, rounding
+        self._lowest, self._highest = -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+
+    def process(self, rate: FloatArray) -> FloatArray:
+        """Return the converted readings [rad/s]; NaN stays NaN."""
+        held: FloatArray = np.clip(rate, -self._limit, self._limit)
+        if not self._rounding:
+            return held
+        counts: FloatArray = np.clip(np.rint(held / self._step), self._lowest, self._highest)
+        return counts * self._step

@@ -1,0 +1,215 @@
+"""Instrument noise after IEEE Std 952: two-sided densities in, rad/s out, the same statistics at any sample rate.
+
+Every term draws from a random stream of its own, so switching one off leaves the others bit-identical, and keeps its
+state, so any division into blocks gives the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.parts import Part
+from testbed.sensors.noise_terms import NoiseStage, Quantization, Ramp, White, flicker, markov, random_walk
+from testbed.signals import random_stream
+from testbed.units import (
+    AngularAcceleration,
+    Frequency,
+    PositiveDuration,
+    QuantizationAngle,
+    RateDensity,
+    RateRandomWalk,
+    RateStd,
+)
+
+if TYPE_CHECKING:
+    from testbed.sensors.noise_terms import NoiseTerm
+    from testbed.signals import FloatArray
+
+
+class GyroTerms(Part):
+    """Noise coefficients of a gyro after IEEE Std 952, two-sided; zero switches a term off.
+
+    Parameters
+    ----------
+    quantization : float
+        Q, standard deviation of the angle error [rad]; S = (2 sin(pi f T) Q)^2 / T.
+    angle_random_walk : float
+        N [rad/sqrt(s)]; S = N^2.
+    bias_instability : float
+        B [rad/s]; true flicker, S = B^2 / (2 pi f) from `lowest_frequency` to half the sample rate, flat below.
+    rate_random_walk : float
+        K [rad/s^1.5], paper 1's ARRW; S = (K / 2 pi f)^2.
+    rate_ramp : float
+        R [rad/s^2].
+    markov_bias : float
+        sigma_b [rad/s] of paper 1's bias model, equation (22): a Markov process and no flicker.
+    markov_time : float
+        Its correlation time T_c [s].
+    lowest_frequency : float
+        Lower end of the flicker band [Hz].
+    """
+
+    quantization: QuantizationAngle = 0.0
+    angle_random_walk: RateDensity = 0.0
+    bias_instability: RateStd = 0.0
+    rate_random_walk: RateRandomWalk = 0.0
+    rate_ramp: AngularAcceleration = 0.0
+    markov_bias: RateStd = 0.0
+    markov_time: PositiveDuration = 100.0
+    lowest_frequency: Frequency = 1e-4
+
+    def noise_psd(self, freq_hz: FloatArray, sample_rate_hz: float) -> FloatArray:
+        """Return the two-sided density of the sum of the random terms.
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequency, above zero [Hz].
+        sample_rate_hz : float
+            Sample rate, which the quantisation depends on [Hz].
+
+        Returns
+        -------
+        ndarray, shape (n_freq,)
+            S(f) [rad^2/s].
+        """
+        turn = 2.0 * np.pi * freq_hz
+        quantized = (2.0 * np.sin(0.5 * turn / sample_rate_hz) * self.quantization) ** 2 * sample_rate_hz
+        pink = self.bias_instability**2 / (2.0 * np.pi * np.maximum(freq_hz, self.lowest_frequency))
+        lagged = 2.0 * self.markov_bias**2 * self.markov_time / (1.0 + (turn * self.markov_time) ** 2)
+        density: FloatArray = (
+            quantized + self.angle_random_walk**2 + pink + (self.rate_random_walk / turn) ** 2 + lagged
+        )
+        return density
+
+    def noise_terms(self, sample_rate_hz: float, seed: int, *names: str) -> dict[str, NoiseTerm]:
+        """Return the terms that are not zero, each on the stream ``(*names, term)`` of `seed`.
+
+        Parameters
+        ----------
+        sample_rate_hz : float
+            Sample rate [Hz].
+        seed : int
+            Seed of the run.
+        *names : str
+            Owner of the streams, such as the sensor's name.
+
+        Returns
+        -------
+        dict of str to NoiseTerm
+            In the order of addition.
+        """
+
+        def stream(term: str) -> np.random.Generator:
+            return random_stream(seed, *names, term)
+
+        terms: dict[str, NoiseTerm] = {}
+        if self.quantization:
+            terms["quantization"] = Quantization(self.quantization, sample_rate_hz, stream("quantization"))
+        if self.angle_random_walk:
+            terms["angle_random_walk"] = White(self.angle_random_walk, sample_rate_hz, stream("angle_random_walk"))
+        if self.bias_instability:
+            source = stream("bias_instability")
+            terms["bias_instability"] = flicker(self.bias_instability, self.lowest_frequency, sample_rate_hz, source)
+        if self.rate_random_walk:
+            terms["rate_random_walk"] = random_walk(self.rate_random_walk, sample_rate_hz, stream("rate_random_walk"))
+        if self.rate_ramp:
+            terms["rate_ramp"] = Ramp(self.rate_ramp, sample_rate_hz)
+        if self.markov_bias:
+            source = stream("markov_bias")
+            terms["markov_bias"] = markov(self.markov_bias, self.markov_time, sample_rate_hz, source)
+        return terms
+
+
+class GyroNoise(GyroTerms):
+    """The noise of a gyro by itself: `sample` for an array, `start` for a stream of blocks."""
+
+    def start(self, sample_rate_hz: float, seed: int, *names: str) -> NoiseStage:
+        """Return the noise in time.
+
+        Parameters
+        ----------
+        sample_rate_hz : float
+            Sample rate [Hz].
+        seed : int
+            Seed of the run.
+        *names : str
+            Owner of the random streams.
+
+        Returns
+        -------
+        NoiseStage
+            ``process(n)`` gives the next n samples [rad/s].
+        """
+        return NoiseStage(self.noise_terms(sample_rate_hz, seed, *names))
+
+    def sample(self, n: int, sample_rate_hz: float, rng: int | np.random.Generator) -> FloatArray:
+        """Return `n` samples of the sum of all terms.
+
+        Parameters
+        ----------
+        n : int
+            Number of samples.
+        sample_rate_hz : float
+            Sample rate [Hz].
+        rng : int or numpy.random.Generator
+            Seed, or a generator from which one is drawn.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Noise [rad/s].
+
+        Raises
+        ------
+        ValueError
+            If `n` is negative, the sample rate not positive or the flicker band too short.
+        """
+        if n < 0:
+            msg = f"n: expected at least 0, got {n}"
+            raise ValueError(msg)
+        if not (sample_rate_hz > 0.0 and math.isfinite(sample_rate_hz)):
+            msg = f"sample_rate_hz: expected a positive number, got {sample_rate_hz}"
+            raise ValueError(msg)
+        seed = int(rng.integers(2**63)) if isinstance(rng, np.random.Generator) else rng
+        return self.start(sample_rate_hz, seed).process(n)
+
+
+class ElectronicTerms(Part):
+    """White plus 1/f noise of an amplifier: S(f) = n^2 (1 + f_knee / f), two-sided.
+
+    Parameters
+    ----------
+    noise_density : float
+        n, two-sided root density of the white part, referred to the reading [rad/s/sqrt(Hz)].
+    noise_knee : float, optional
+        f_knee, where both parts are equal [Hz]; left out: no 1/f part.
+    lowest_frequency : float
+        Lower end of the 1/f part, flat below [Hz].
+    """
+
+    noise_density: RateDensity = 0.0
+    noise_knee: Frequency | None = None
+    lowest_frequency: Frequency = 1e-4
+
+    def noise_psd(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the two-sided density at `freq_hz` [Hz], above zero, shape (n_freq,) [rad^2/s]."""
+        knee = self.noise_knee or 0.0
+        density: FloatArray = self.noise_density**2 * (1.0 + knee / np.maximum(freq_hz, self.lowest_frequency))
+        return density
+
+    def noise_terms(self, sample_rate_hz: float, seed: int, *names: str) -> dict[str, NoiseTerm]:
+        """Return the white and the 1/f term, each on its own stream; arguments as `GyroTerms.noise_terms`."""
+        if not self.noise_density:
+            return {}
+        terms: dict[str, NoiseTerm] = {
+            "white": White(self.noise_density, sample_rate_hz, random_stream(seed, *names, "white"))
+        }
+        if self.noise_knee is not None:
+            level = self.noise_density * math.sqrt(2.0 * math.pi * self.noise_knee)
+            source = random_stream(seed, *names, "flicker")
+            terms["flicker"] = flicker(level, self.lowest_frequency, sample_rate_hz, source)
+        return terms

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import allantools
+import numpy as np
+import pytest
+from allantools import ci
+
+from testbed.sensors.allan import AllanCurve, allan_deviation, fit_allan
+from testbed.sensors.allan_freedom import equivalent_freedom
+from testbed.sensors.noise import GyroNoise
+
+TERMS = ("quantization", "angle_random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
+
+
+def nist_series() -> list[float]:
+    """Return the 1000-point test set of NIST SP 1065: a linear congruential generator."""
+    values, n = [], 1234567890
+    for _ in range(1000):
+        values.append(n / 2147483647)
+        n = 16807 * n % 2147483647
+    return values
+
+
+@pytest.mark.oracle
+def test_deviation_meets_the_nist_test_set() -> None:
+    # NIST SP 1065, published overlapping Allan deviation, seven digits.
+    curve = allan_deviation(np.array(nist_series()), 1.0, np.array([1.0, 10.0, 100.0]))
+    np.testing.assert_allclose(curve.deviation, [2.922319e-01, 9.159953e-02, 3.241343e-02], rtol=2e-7)
+
+
+@pytest.mark.oracle
+def test_deviation_equals_allantools() -> None:
+    rate = np.random.default_rng(1).standard_normal(20_001).cumsum() + 100.0
+    curve = allan_deviation(rate, 50.0)
+    _, wanted, _, _ = allantools.oadev(rate, rate=50.0, data_type="freq", taus=curve.tau)
+    # allantools keeps the mean: 100 s of angle per second costs it digits, eps * theta / (deviation tau).
+    np.testing.assert_allclose(curve.deviation, wanted, rtol=1e-8)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("alpha", [2, 0, -1, -2])
+@pytest.mark.parametrize("n_angle", [1001, 20_001])
+def test_degrees_of_freedom_equal_allantools(alpha: int, n_angle: int) -> None:
+    for m in (1, 2, 5, 10, 31, 63, 64, 100, 250):
+        wanted = ci.edf_greenhall(alpha, 2, m, n_angle, overlapping=True, modified=False)
+        # Both replace long sums by shorter ones; Greenhall and Riley give theirs as good to a few percent.
+        assert equivalent_freedom(m, n_angle, alpha) == pytest.approx(wanted, rel=0.02)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("keys", "exponent"), [({"angle_random_walk": 1e-4}, -1), ({"rate_random_walk": 1e-4}, 1)])
+def test_limits_cover_the_true_deviation(keys: dict[str, float], exponent: int) -> None:
+    runs, fs, tau = 300, 10.0, np.array([1.0, 3.0, 10.0, 30.0, 60.0])
+    m = tau * fs
+    true = 1e-4 * np.sqrt(tau**exponent * (1.0 if exponent < 0 else (1.0 + 0.5 / m**2) / 3.0))
+    inside = np.zeros(tau.size)
+    for seed in range(runs):
+        curve = allan_deviation(GyroNoise(**keys).sample(3000, fs, seed), fs, tau)
+        inside += (curve.lower <= true) & (true <= curve.upper)
+    # 99.9 % binomial band about 0.95 for 300 runs is 0.905-0.986; 1.5 % is allowed for the type of noise being guessed.
+    assert np.all((inside / runs > 0.89) & (inside / runs < 0.99)), inside / runs
+
+
+def exact_curve(**true: float) -> AllanCurve:
+    tau = np.round(np.geomspace(100, 250_000, 40)) / 100.0
+    q, n, b, k, r = (true.get(name, 0.0) ** 2 for name in TERMS)
+    variance = 3 * q / tau**2 + n / tau + 2 * math.log(2) / math.pi * b + k * tau / 3 + r * tau**2 / 2
+    deviation = np.sqrt(variance)
+    return AllanCurve(tau, deviation, deviation, deviation, np.ones(tau.size), 1_000_000, 100.0)
+
+
+@pytest.mark.oracle
+def test_fit_recovers_the_coefficients_of_an_exact_curve() -> None:
+    true = dict(zip(TERMS, (1e-4, 1e-4, 3e-5, 2e-6, 1e-7), strict=True))
+    fit = fit_allan(exact_curve(**true))
+    for name in TERMS:
+        got = getattr(fit, name)
+        assert got.upper >= true[name] >= got.lower
+        if got.identified:
+            # Sampled columns differ from the continuous ones by 1/m^2 = 1e-4 at most (m >= 100 here).
+            assert got.value == pytest.approx(true[name], rel=1e-3)
+    assert fit.angle_random_walk.identified
+
+
+def test_fit_gives_an_upper_limit_for_what_the_record_cannot_show() -> None:
+    fit = fit_allan(allan_deviation(GyroNoise(angle_random_walk=1e-4).sample(20_000, 100.0, 3), 100.0))
+    assert fit.angle_random_walk.identified
+    for name in set(TERMS) - {"angle_random_walk"}:
+        got = getattr(fit, name)
+        assert not got.identified
+        assert math.isnan(got.value)
+        assert got.lower == 0.0
+        assert 0.0 < got.upper < math.inf
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("fs", [100.0, 2000.0, 20000.0])
+@pytest.mark.parametrize("name", ["quantization", "angle_random_walk", "bias_instability", "rate_random_walk"])
+def test_fit_finds_each_term_alone_at_three_rates(name: str, fs: float) -> None:
+    fit = fit_allan(allan_deviation(GyroNoise(**{name: 1e-5}).sample(100_000, fs, 17), fs))
+    got = getattr(fit, name)
+    assert got.identified
+    # A 95 % interval, four times as wide: 8 standard deviations.
+    margin = 3.0 * (got.upper - got.lower)
+    assert got.lower - margin < 1e-5 < got.upper + margin
+    assert got.upper / got.lower < 1.6
+
+
+@pytest.mark.slow
+@pytest.mark.oracle
+def test_fit_intervals_cover_the_coefficients_of_a_gyro() -> None:
+    # N and B of the ADIS16505 presets; a record of 1000 s at 100 Hz shows both, and no rate random walk.
+    true = {"angle_random_walk": 4.3633e-05, "bias_instability": 1.3090e-05 * 3, "rate_random_walk": 8.08e-09}
+    runs, fs = 200, 100.0
+    covered = dict.fromkeys(true, 0)
+    shown = dict.fromkeys(true, 0)
+    for seed in range(runs):
+        fit = fit_allan(allan_deviation(GyroNoise(**true).sample(100_000, fs, seed), fs))
+        for name, value in true.items():
+            got = getattr(fit, name)
+            shown[name] += got.identified
+            covered[name] += got.lower <= value <= got.upper
+    # 99 % binomial band of 200 runs at 0.95.
+    for name in ("angle_random_walk", "bias_instability"):
+        assert 181 <= covered[name] <= 197, covered
+        assert shown[name] > 0.95 * runs
+    # An upper limit covers from below only, so it may always hold; a term that is not there is seen once in 700.
+    assert covered["rate_random_walk"] >= 181
+    assert shown["rate_random_walk"] <= 4
+
+
+def test_fit_scales_with_the_unit() -> None:
+    rate = GyroNoise(angle_random_walk=1e-4, bias_instability=1e-4).sample(20_000, 100.0, 1)
+    small, large = (fit_allan(allan_deviation(rate * scale, 100.0)) for scale in (1.0, 2.0**20))
+    for name in TERMS:
+        a, b = dataclasses.astuple(getattr(small, name)), dataclasses.astuple(getattr(large, name))
+        np.testing.assert_allclose(np.array(b) / 2.0**20, a, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate", "fs", "tau", "message"),
+    [
+        (np.zeros((2, 8)), 1.0, None, "rate: expected a vector"),
+        (np.zeros(3), 1.0, None, "rate: expected a vector of at least 4"),
+        (np.array([0.0, 1.0, np.nan, 0.0]), 1.0, None, "got nan at sample 2"),
+        (np.zeros(8), 0.0, None, "sample_rate_hz: expected a positive number"),
+        (np.zeros(8), 1.0, np.array([0.2]), "tau: expected 1 to 4 s"),
+        (np.zeros(8), 1.0, np.array([5.0]), "tau: expected 1 to 4 s"),
+        (np.zeros(8), 1.0, np.array([]), "tau: expected 1 to 4 s"),
+    ],
+)
+def test_deviation_refuses(rate: np.ndarray, fs: float, tau: np.ndarray | None, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        allan_deviation(rate, fs, tau)
+
+
+def test_fit_refuses_a_constant_and_a_short_curve() -> None:
+    with pytest.raises(ValueError, match="curve: expected"):
+        fit_allan(allan_deviation(np.ones(1000), 1.0))
+    with pytest.raises(ValueError, match="curve: expected"):
+        fit_allan(allan_deviation(np.random.default_rng(1).standard_normal(100), 1.0, np.array([1.0, 2.0])))
