@@ -1,0 +1,51 @@
+"""Start-up: a 1 s scenario, the second time, against the import of the libraries that it needs; and `testbed --help`.
+
+Promise: at most twice what importing its libraries takes; `--help` imports no heavy library. Whole processes, taken in turn, medians.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+LIBRARIES = (
+    "numpy, scipy.linalg, scipy.signal, scipy.interpolate, numba, mujoco, mujoco.batch, pydantic, pint, ruamel.yaml, h5netcdf, "
+    "rerun, rerun.blueprint, matplotlib.figure, jinja2, rich.console, rich.progress, typer"
+)
+ROOT = Path(__file__).parents[1]
+
+
+def seconds(*command: str, cwd: str) -> float:
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=cwd)
+    return time.perf_counter() - begin
+
+
+def main(repeats: int = 7) -> None:
+    text = (ROOT / "scenarios" / "mixed_0p5hz_10hz.yaml").read_text()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "one_second.yaml"
+        path.write_text(text.replace("duration: 20 s", "duration: 1 s").replace("settle: 10 s", "settle: 0.5 s").replace("expect:", "description2:").split("description2:")[0])
+        cases = {
+            "import of the libraries": ("-c", f"import {LIBRARIES}"),
+            "testbed run, 1 s": ("-m", "testbed", "run", str(path)),
+            "testbed --help": ("-m", "testbed", "--help"),
+        }
+        times: dict[str, list[float]] = {label: [] for label in cases}
+        for turn in range(repeats + 1):
+            for label, command in cases.items():
+                spent = seconds(*command, cwd=folder)
+                if turn:  # the first turn fills the caches
+                    times[label].append(spent)
+    medians = {label: statistics.median(values) for label, values in times.items()}
+    for label, value in medians.items():
+        print(f"{label:<26}{value:7.2f} s")
+    print(f"run / import              {medians['testbed run, 1 s'] / medians['import of the libraries']:7.2f}   (promised: at most 2)")
+
+
+if __name__ == "__main__":
+    main()

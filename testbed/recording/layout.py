@@ -1,0 +1,186 @@
+"""The layout a recording opens with: turntable and fluid on the left, rates, errors and diagnostics on the right."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from testbed.recording.channel import HEIGHT, WIDTH
+from testbed.recording.stream import TIMELINE
+from testbed.recording.world import rotor_extent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    import mujoco
+
+    from testbed.recording.stream import Clock
+
+ZOOM = 0.05  # s on each side of the time cursor
+LEGEND = 0.25  # room for the legend, as a share of the span
+DIAGNOSTICS = {  # prefix of the name: quantity and unit
+    "R_": ("Adapted R", "(rad/s)²"),
+    "N_": ("Noise statistic N", "(rad/s)²"),
+    "band_": ("Band: 0 low, 1 mid, 2 high", "-"),
+    "innovation_": ("Innovation", "rad/s"),
+    "innovation_variance_": ("Innovation variance", "(rad/s)²"),
+    "S_": ("Factor S of R", "-"),
+    "Q_": ("Process noise Q", "(rad/s)²"),
+    "std": ("Predicted std", "rad/s"),
+    "": ("Diagnostic", ""),
+}
+
+
+def blueprint(
+    *,
+    entities: Sequence[str],
+    sensors: Sequence[str],
+    filters: Sequence[str],
+    channels: Sequence[str],
+    model: mujoco.MjModel,
+    clock: Clock,
+) -> rrb.Blueprint:
+    """Return the layout for the signals that the recording has.
+
+    Parameters
+    ----------
+    entities : sequence of str
+        Paths of the scalar signals.
+    sensors, filters, channels : sequence of str
+        Names of the sensors, of the filters and of the sensors that have a velocity profile.
+    model : mujoco.MjModel
+        The bodies, for the place of the camera.
+    clock : Clock
+        Length of the run and the window recorded sample by sample.
+    """
+    window, duration = clock.detail, clock.n_time / clock.sample_rate_hz
+    rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
+    rates += [f"/fusion/{n}/rate" for n in filters]
+    truth_and_filters = ["/truth/rate", *(f"/fusion/{n}/rate" for n in filters)]
+    zoom = (window[0], min(window[0] + 0.5, duration))
+    span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
+    left: list[rrb.View | rrb.Container] = [_turntable(model)]
+    if channels:
+        probes = [(f"At three heights, {n} [rad/s]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
+        left.append(_tabs([*map(_profile, channels), *(_plot(*probe, zoom) for probe in probes)]))
+    right: list[rrb.View | rrb.Container] = [
+        _plot("Rate, whole run [rad/s]", rates, (0.0, duration)),
+        _tabs(
+            [
+                _plot(f"Rate, {span} [rad/s]", rates, zoom),
+                _at_cursor("Rate ±50 ms at the cursor [rad/s]", rates),
+                _plot("Truth and estimates [rad/s]", truth_and_filters, (0.0, duration)),
+            ]
+        ),
+    ]
+    if filters:
+        errors = [f"/fusion/{n}/error" for n in filters]
+        right.append(
+            _tabs(
+                [
+                    _plot(f"Error = estimate − truth, {span} [rad/s]", errors, zoom),
+                    _plot(f"Error from {window[0]:g} s on [rad/s]", errors, (window[0], duration)),
+                    _plot("Error, whole run [rad/s]", errors, (0.0, duration)),
+                ]
+            )
+        )
+    if diagnostics := _diagnostics(entities, sensors, duration):
+        right.append(_tabs(diagnostics))
+    shares = {"row_shares": [3, 2]} if channels else {}
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(*left, **shares),
+            rrb.Vertical(*right, row_shares=[5, 6, 4, 4][: len(right)]),
+            column_shares=[2, 3],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed"),
+        collapse_panels=True,
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _tabs(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
+    return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
+
+
+def _absolute(seconds: float) -> rrb.TimeRangeBoundary:
+    return rrb.TimeRangeBoundary.absolute(seconds=seconds)
+
+
+def _plot(name: str, contents: Iterable[str], span: tuple[float, float]) -> rrb.TimeSeriesView:
+    data = rr.TimeRange(start=_absolute(span[0]), end=_absolute(span[1]))
+    # The legend stands in an empty margin, not on the curves.
+    length = span[1] - span[0]
+    shown = rr.TimeRange(start=_absolute(span[0] - LEGEND * length), end=_absolute(span[1] + 0.02 * length))
+    return _series(name, contents, data, shown)
+
+
+def _at_cursor(name: str, contents: Iterable[str]) -> rrb.TimeSeriesView:
+    at = rrb.TimeRangeBoundary.cursor_relative
+    data = rr.TimeRange(start=at(seconds=-ZOOM), end=at(seconds=ZOOM))
+    shown = rr.TimeRange(start=at(seconds=-ZOOM * (1 + 2 * LEGEND)), end=at(seconds=ZOOM))
+    return _series(name, contents, data, shown)
+
+
+def _series(name: str, contents: Iterable[str], data: rr.TimeRange, shown: rr.TimeRange) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=list(contents),
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=shown),
+        time_ranges=[rrb.VisibleTimeRange(TIMELINE, range=data)],
+        plot_legend=rrb.PlotLegend("LeftTop"),
+    )
+
+
+def _diagnostics(entities: Sequence[str], sensors: Sequence[str], duration: float) -> list[rrb.View | rrb.Container]:
+    """One tab per quantity, in it one plot per sensor, for the sensors differ by orders of magnitude."""
+    groups: dict[str, dict[str, list[str]]] = {kind: {} for kind in DIAGNOSTICS}
+    for entity in entities:
+        top, _, name, *_ = [*entity.split("/")[1:], ""]
+        if top == "fusion" and name not in {"rate", "error"}:
+            # The longest prefix decides: innovation_variance_ is no innovation_.
+            kind = max((kind for kind in DIAGNOSTICS if name.startswith(kind)), key=len)
+            of = name.removeprefix(kind)
+            groups[kind].setdefault(of if of in sensors or not kind else "", []).append(entity)
+    return [_beside(kind, by_sensor, duration) for kind, by_sensor in groups.items() if by_sensor]
+
+
+def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float) -> rrb.View | rrb.Container:
+    quantity, unit = DIAGNOSTICS[kind]
+    suffix = f" [{unit}]" if unit else ""
+    plots = [
+        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration))
+        for of, contents in contents_of.items()
+    ]
+    return plots[0] if len(plots) == 1 else rrb.Horizontal(*plots, name=quantity + suffix)
+
+
+def _turntable(model: mujoco.MjModel) -> rrb.Spatial3DView:
+    rotor = rotor_extent(model)
+    target = np.array([rotor.center[0], rotor.center[1], rotor.top - 0.4 * rotor.radius])
+    eye = target + rotor.radius * np.array([2.6, -0.95, 1.9])
+    return rrb.Spatial3DView(
+        origin="/world",
+        name="Turntable",
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=[0, 0, 1]),
+        line_grid=False,
+        background=rrb.Background((26, 30, 36)),
+    )
+
+
+def _profile(sensor: str) -> rrb.Spatial2DView:
+    margin = 26.0
+    bounds = rrb.VisualBounds2D(
+        x_range=[-WIDTH / 2 - margin, WIDTH / 2 + margin], y_range=[-HEIGHT - 0.6 * margin, margin]
+    )
+    return rrb.Spatial2DView(
+        origin=f"/sensors/{sensor}/channel",
+        contents=["$origin/profile", "$origin/axes", "$origin/labels"],
+        name=f"Fluid velocity profile, {sensor}",
+        visual_bounds=bounds,
+    )

@@ -1,0 +1,135 @@
+"""What the parts of a recording share: the stream to the file, the timeline, and one plotted signal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from testbed.palette import rgb
+from testbed.recording.envelope import Envelope
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from testbed.signals import FloatArray
+
+TIMELINE = "sim_time"
+ROWS = 16384  # rows sent at once; the viewer cuts chunks to 4096 rows anyway
+
+
+class Clock:
+    """The base clock of a run in integer nanoseconds: k / fs is never accumulated and never a rounded float.
+
+    Parameters
+    ----------
+    sample_rate_hz : float
+        Base rate fs [Hz].
+    n_time : int
+        Number of base samples of the run.
+    detail : tuple of float
+        Start and end of the window recorded sample by sample [s].
+    """
+
+    def __init__(self, sample_rate_hz: float, n_time: int, detail: tuple[float, float]) -> None:
+        self.sample_rate_hz, self.n_time, self.detail = sample_rate_hz, n_time, detail
+
+    def nanoseconds(self, index: NDArray[np.int64]) -> NDArray[np.timedelta64]:
+        """Return t = k / fs of the base samples k as timedelta64[ns], rounded to the nearest nanosecond."""
+        rate = round(self.sample_rate_hz)
+        if rate == self.sample_rate_hz:
+            stamps = (index * 1_000_000_000 + rate // 2) // rate
+        else:
+            stamps = np.rint(index * (1e9 / self.sample_rate_hz)).astype(np.int64)
+        return stamps.astype("timedelta64[ns]")
+
+    def envelope(self, stride: int, *, detailed: bool) -> Envelope:
+        """Return the chooser for a signal with a sample at every `stride`-th base sample; without detail, extremes only."""
+        start, end = (round(t * self.sample_rate_hz) for t in self.detail)
+        window = (-(-start // stride), end // stride + 1) if detailed else (0, 0)
+        return Envelope(-(-self.n_time // stride), window)
+
+
+class Recording:
+    """A Rerun stream with the run's clock; every call is strict, so nothing is dropped with a warning."""
+
+    def __init__(self, stream: rr.RecordingStream, clock: Clock) -> None:
+        self.stream, self.clock = stream, clock
+
+    def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
+        """Log what does not change in time."""
+        self.stream.log(entity, *archetypes, static=True, strict=True)
+
+    def columns(self, entity: str, index: NDArray[np.int64], columns: Iterable[rr.ComponentColumn]) -> None:
+        """Log one row for each base sample of `index`."""
+        stamps = self.clock.nanoseconds(index)
+        self.stream.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=stamps)], columns, strict=True)
+
+    def lines(self, entity: str, names: Sequence[str], colors: Sequence[str], width: float = 1.5) -> None:
+        """Name and colour the series of an entity; the default policy would draw fast oscillations as their mean."""
+        widths = [width] * len(names)
+        rgbs = [rgb(color) for color in colors]
+        style = rr.SeriesLines(names=names, colors=rgbs, widths=widths, aggregation_policy="MinMax")
+        self.static(entity, style)
+
+
+class Signal:
+    """One scalar signal of the recording: its samples pass an `Envelope` and are sent in large chunks.
+
+    Parameters
+    ----------
+    recording : Recording
+        Where it goes.
+    entity : str
+        Path of the entity.
+    stride : int
+        Base samples per sample of this signal.
+    name, color : str
+        Of the line; the name carries the unit.
+    width : float
+        Of the line, in points of the screen.
+    detailed : bool
+        Whether it has every sample inside the window of the clock.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        entity: str,
+        stride: int,
+        *,
+        name: str,
+        color: str,
+        width: float = 1.5,
+        detailed: bool = True,
+    ) -> None:
+        self.entity = entity
+        self._recording, self._stride = recording, stride
+        self._envelope = recording.clock.envelope(stride, detailed=detailed)
+        self._waiting: list[tuple[NDArray[np.int64], FloatArray]] = []
+        self._n_waiting = 0
+        recording.lines(entity, [name], [color], width)
+
+    def write(self, values: FloatArray) -> None:
+        """Add the next samples [unit of the entity]."""
+        self._add(*self._envelope.process(values))
+
+    def finish(self) -> None:
+        """Send what is still held back."""
+        self._add(*self._envelope.finish())
+        self._send()
+
+    def _add(self, index: NDArray[np.int64], values: FloatArray) -> None:
+        self._waiting.append((index, values))
+        self._n_waiting += index.size
+        if self._n_waiting >= ROWS:
+            self._send()
+
+    def _send(self) -> None:
+        if self._n_waiting:
+            index, values = (np.concatenate(part) for part in zip(*self._waiting, strict=True))
+            self._recording.columns(self.entity, index * self._stride, rr.Scalars.columns(scalars=values))
+        self._waiting, self._n_waiting = [], 0

@@ -1,0 +1,208 @@
+"""The Rerun recording of a run, written block by block into one file that opens with its own layout."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from testbed.errors import RunError
+from testbed.palette import series_colors
+from testbed.recording.channel import Channel
+from testbed.recording.layout import blueprint
+from testbed.recording.stream import Clock, Recording, Signal
+from testbed.recording.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from types import TracebackType
+
+    import mujoco
+
+    from testbed.pipeline import RunBlock
+    from testbed.signals import FloatArray
+
+APPLICATION = "testbed"
+FULL = 1 << 20  # bytes; with less room than this a disk is called full
+FLUSH_TIMEOUT = 60.0  # s; a disk slower than this for the last few MB is taken for a failure
+
+
+class RecordingWriter:
+    """Write a run to an .rrd file: bodies, rates, errors, diagnostics and velocity profiles on the timeline `sim_time`.
+
+    A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample, and, if it
+    is a rate or an error, every sample inside `detail`. Samples that are not finite are left out.
+
+    Parameters
+    ----------
+    path : Path
+        File to be written.
+    scenario_name : str
+        Name of the recording.
+    sample_rate_hz : float
+        Base rate [Hz].
+    n_time : int
+        Number of base samples of the run.
+    sensor_rates : mapping of str to float
+        Rate of each sensor [Hz], a divisor of the base rate.
+    fusion_names : sequence of str
+        Filters, whose estimates come at the rate of the fastest sensor.
+    model : mujoco.MjModel
+        Bodies of the turntable.
+    settle : float
+        Start of the part that is judged [s].
+    detail : tuple of float, optional
+        Start and end of the window recorded sample by sample [s]; by default the 2 s after `settle`.
+    pose_stride : int
+        Base samples between poses and between profiles.
+
+    Raises
+    ------
+    RunError
+        If the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        scenario_name: str,
+        sample_rate_hz: float,
+        n_time: int,
+        sensor_rates: Mapping[str, float],
+        fusion_names: Sequence[str],
+        model: mujoco.MjModel,
+        settle: float,
+        detail: tuple[float, float] | None = None,
+        pose_stride: int = 400,
+    ) -> None:
+        self._path = Path(path)
+        self._model, self._pose_stride = model, pose_stride
+        self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
+        self._fusion_names = list(fusion_names)
+        self._fusion_stride = min(self._strides.values(), default=1)
+        self._colors = series_colors(list(sensor_rates), self._fusion_names)
+        self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
+        try:
+            self._stream.save(self._path)
+        except RuntimeError as error:
+            raise self._failure(str(error)) from error
+        self._stream.send_recording_name(scenario_name)
+        self._recording = Recording(self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)))
+        self._signals: dict[str, Signal] = {}
+        self._world = World(self._recording, model, {name: self._colors[f"sensors/{name}"] for name in sensor_rates})
+        self._channels: dict[str, Channel] = {}
+        self._open = True
+
+    def write(self, block: RunBlock) -> None:
+        """Add the next block of the run."""
+        truth = block.truth.rate
+        self._add("/commanded/rate", block.command.rate[: truth.size], 1, "commanded [rad/s]", "commanded", 1.0)
+        self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
+        for name, readings in block.sensors.items():
+            key = f"sensors/{name}"
+            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+        reference = truth[-block.start % self._fusion_stride :: self._fusion_stride]
+        for name, estimate in block.fusion.items():
+            key = f"fusion/{name}"
+            stride = self._fusion_stride
+            self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
+            self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
+            for series, values in {"std": estimate.std, **estimate.diagnostics}.items():
+                self._add(f"/{key}/{series}", values, stride, name, key, detailed=False)
+        self._write_poses(block)
+
+    def close(self) -> None:
+        """Finish the file and read it back; closing twice is allowed.
+
+        Raises
+        ------
+        RunError
+            If it is not on the disk as a whole.
+        """
+        if not self._open:
+            return
+        self._open = False
+        for signal in self._signals.values():
+            signal.finish()
+        for channel in self._channels.values():
+            channel.finish()
+        self._world.finish()
+        self._stream.send_blueprint(self._blueprint())
+        try:
+            # Only flush reports a full disk; disconnect is silent about it.
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT)
+            self._stream.disconnect()
+            RrdReader(self._path).store()
+        except (RuntimeError, OSError, ValueError) as error:
+            failure = self._failure(str(error))
+            self.abort()
+            raise failure from error
+
+    def abort(self) -> None:
+        """Give the recording up and remove its file."""
+        self._open = False
+        self._stream.disconnect()
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.abort()
+
+    def _add(
+        self,
+        entity: str,
+        values: FloatArray,
+        stride: int,
+        name: str,
+        key: str,
+        width: float = 1.5,
+        *,
+        detailed: bool = True,
+    ) -> None:
+        if entity not in self._signals:
+            self._signals[entity] = Signal(
+                self._recording, entity, stride, name=name, color=self._colors[key], width=width, detailed=detailed
+            )
+        self._signals[entity].write(values)
+
+    def _write_poses(self, block: RunBlock) -> None:
+        first = -block.start % self._pose_stride
+        index = np.arange(block.start + first, block.start + block.truth.rate.size, self._pose_stride)
+        self._world.write(index, block.truth.poses, block.truth.angle[first :: self._pose_stride])
+        for name, (heights, profiles) in block.profiles.items():
+            if name not in self._channels:
+                self._channels[name] = Channel(self._recording, name, heights, self._colors[f"sensors/{name}"])
+            self._channels[name].write(index, profiles)
+
+    def _blueprint(self) -> rr.blueprint.Blueprint:
+        return blueprint(
+            entities=list(self._signals),
+            sensors=list(self._strides),
+            filters=self._fusion_names,
+            channels=list(self._channels),
+            model=self._model,
+            clock=self._recording.clock,
+        )
+
+    def _failure(self, reason: str) -> RunError:
+        try:
+            free = shutil.disk_usage(self._path.parent).free
+        except OSError:
+            place = "its folder cannot be read"
+        else:
+            place = f"{'its disk is full: ' if free < FULL else ''}{free / 1e6:.1f} MB free"
+        return RunError(f"{self._path}: the recording could not be written ({place}): {reason}")
