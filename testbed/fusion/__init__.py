@@ -1,0 +1,80 @@
+"""Fusion of rate sensors: estimators that see readings and their own belief, never the truth.
+
+A filter is built from (belief, sample rates, parameters) and turns blocks of readings into blocks of estimates.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from testbed.fusion.base import EstimateBlock
+
+__all__ = ["FILTERS", "EstimateBlock", "estimate"]
+
+FILTERS = {
+    "kalman": "testbed.fusion.kalman:Kalman",
+    "shakf": "testbed.fusion.shakf:Shakf",
+    "arw_shakf": "testbed.fusion.arw_shakf:ArwShakf",
+    "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
+}
+
+
+def estimate(
+    name: str,
+    readings: Mapping[str, ArrayLike],
+    *,
+    sample_rate_hz: Mapping[str, float],
+    belief: Mapping[str, Any] | str | None = None,
+    **parameters: Any,
+) -> EstimateBlock:
+    """Run the filter `name` over whole records, such as from one's own logger.
+
+    Parameters
+    ----------
+    name : str
+        Registered filter, or ``package.module:Class``.
+    readings : mapping of str to array_like, shape (n_sensor_samples,)
+        Readings of each sensor [rad/s]; all start at t = 0. Not finite means no reading. A sensor at 1/s of the fastest rate has
+        ceil(n / s) readings for n of the fastest; nothing is trimmed.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
+    belief : mapping or str, optional
+        What the filter believes about each sensor, or the name of a shipped belief; default equation (39) with the presets' noise.
+    **parameters : Any
+        Fields of the filter's ``Parameters``, SI floats or strings with units.
+
+    Returns
+    -------
+    EstimateBlock
+        Rate, standard deviation [rad/s] and diagnostics at the fastest rate, shape (n_time,).
+
+    Raises
+    ------
+    UnknownNameError
+        If no such filter or belief exists.
+    ValueError
+        If a parameter, a rate or the length of a record is wrong.
+    """
+    from testbed.fusion.belief import default_belief, load_belief
+    from testbed.parts import resolve
+
+    kind = "filter"
+    cls = resolve(kind, name, FILTERS)
+    believed = default_belief() if belief is None else load_belief(belief)
+    block: EstimateBlock = cls(believed, sample_rate_hz, cls.Parameters(**parameters)).process(readings)
+    return block
+
+
+def __getattr__(name: str) -> Any:
+    # Imported on demand, so that the registry can be read without numba.
+    if name == "EstimateBlock":
+        from testbed.fusion.base import EstimateBlock
+
+        return EstimateBlock
+    msg = f"module {__name__!r} has no attribute {name!r}"
+    raise AttributeError(msg)

@@ -1,0 +1,208 @@
+"""What every filter shares: its parameters, the schedule of several sample rates, and the block it returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+
+import numpy as np
+from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
+
+from testbed.fusion.model import FusionModel, build_model
+from testbed.parts import Part
+from testbed.units import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+    from pydantic.config import JsonDict
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.signals import FloatArray
+
+DEG = math.pi / 180.0
+
+Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
+
+_Q_SCHEMA = cast(
+    "JsonDict", {"type": "string", "description": "(deg/s)^2/s^(2 order - 1)", "examples": ["0.3 (deg/s)^2/s"]}
+)
+_UNITS = {
+    "innovation": "rad/s",
+    "innovation_variance": "rad^2/s^2",
+    "R": "rad^2/s^2",
+    "N": "rad^2/s^2",
+    "Q_rate": "rad^2/s^2",
+}
+
+
+def diagnostic_unit(name: str) -> str:
+    """Return the SI unit of the diagnostic `name` of an `EstimateBlock` ("1" for bands, factors and counts)."""
+    stem = next((key for key in sorted(_UNITS, key=len, reverse=True) if name == key or name.startswith(key + "_")), "")
+    return _UNITS.get(stem, "1")
+
+
+@dataclass(frozen=True)
+class EstimateBlock:
+    """Estimate over a block, at the fastest sensor rate.
+
+    Parameters
+    ----------
+    rate, std : ndarray, shape (n_time,)
+        Estimated rate and its reported standard deviation [rad/s].
+    diagnostics : dict of str to ndarray, shape (n_time,)
+        As far as the filter has them, NaN where undefined (such as between the readings of a slow sensor). Innovations are those of (11),
+        before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
+        R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36).
+        N_<sensor> is N_k / dT of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
+        guard_hits counts how often a bound held R or Q so far.
+    """
+
+    rate: FloatArray
+    std: FloatArray
+    diagnostics: dict[str, FloatArray]
+
+
+def signal_noise_unit(order: int) -> str:
+    """Return the SI unit of q for a signal model of that order: (rad/s)^2/s for 1, and s^-2 more for each further order."""
+    return f"rad^2/s^{2 * order + 1}"
+
+
+class FilterParameters(Part):
+    """Parameters of the signal model, common to the filters.
+
+    Parameters
+    ----------
+    order : int
+        Number m of integrators between the white noise and the rate, 1 to 3.
+    q : float
+        Its density [rad^2/s^(2m+1)], such as "0.3 (deg/s)^2/s" for order 1 or "1e6 (deg/s)^2/s^3" for order 2; None takes the filter's own.
+    use_input_noise : bool
+        Count the input noise of the belief as process noise.
+    """
+
+    default_q: ClassVar[dict[int, float]] = {}
+
+    order: Annotated[int, Field(ge=1, le=3)] = 1
+    q: Annotated[float, Field(validate_default=True, json_schema_extra=_Q_SCHEMA)] = cast("float", None)
+    use_input_noise: bool = True
+
+    @field_validator("q", mode="before")
+    @classmethod
+    def _read_q(cls, value: Any, info: ValidationInfo) -> float:
+        order = info.data.get("order", 1)
+        if value is None:
+            if order not in cls.default_q:
+                msg = f"expected a value in {signal_noise_unit(order)}: there is no default for order {order}"
+                raise ValueError(msg)
+            return cls.default_q[order]
+        example = "0.3 (deg/s)^2/s" if order == 1 else f"1e6 (deg/s)^2/s^{2 * order - 1}"
+        return Quantity(signal_noise_unit(order), example, at_least=0.0).validate(value, info)
+
+    @field_serializer("q")
+    def _write_q(self, value: float, info: SerializationInfo) -> str | float:
+        return f"{value!r} {signal_noise_unit(self.order)}" if (info.context or {}).get("border") else value
+
+
+class BlockFilter:
+    """Common part of the filters: builds the model, checks the blocks and spreads their readings over the fastest rate.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        What is believed about each sensor.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
+    parameters : FilterParameters
+        Parameters of the filter.
+
+    Raises
+    ------
+    ValueError
+        If a sensor has no belief, a rate does not divide the fastest one, or a parameter names an unknown sensor.
+    """
+
+    def __init__(
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: FilterParameters
+    ) -> None:
+        self.model: FusionModel = build_model(
+            belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
+        )
+        self._sample = 0
+        self._x = np.zeros(self.model.F.shape[0])
+        self._P = self.model.P0.copy()
+
+    def measurement_noise(self, key: str, chosen: Mapping[str, float], *, explicit: bool) -> FloatArray:
+        """Return R [rad^2/s^2] per sensor: the chosen one, or else the belief's.
+
+        Parameters
+        ----------
+        key : str
+            Name of the parameter that `chosen` comes from, for the message.
+        chosen : mapping of str to float
+            R of some sensors [rad^2/s^2].
+        explicit : bool
+            The user named these sensors, so an unknown one is an error.
+
+        Returns
+        -------
+        ndarray, shape (n_sensor,)
+            R [rad^2/s^2].
+
+        Raises
+        ------
+        ValueError
+            If a chosen sensor is unknown or an R is not positive.
+        """
+        self.check_sensors(key, chosen, explicit=explicit)
+        R = np.array([chosen.get(name, self.model.R[i]) for i, name in enumerate(self.model.sensors)])
+        for name, value in zip(self.model.sensors, R, strict=True):
+            if not value > 0.0:
+                msg = f"{key}: expected more than 0 for {name!r}, got {value}; give it here or give the belief an output_noise"
+                raise ValueError(msg)
+        return R
+
+    def check_sensors(self, key: str, chosen: Mapping[str, Any], *, explicit: bool) -> None:
+        """Raise ValueError if `chosen`, given by the user under `key`, names a sensor that the filter does not have."""
+        unknown = [name for name in chosen if name not in self.model.sensors]
+        if explicit and unknown:
+            msg = f"{key}: expected sensors of {list(self.model.sensors)}, got {unknown}"
+            raise ValueError(msg)
+
+    def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
+        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is missing.
+
+        Parameters
+        ----------
+        readings : mapping of str to array_like, shape (n_sensor_samples,)
+            Readings of every sensor in this block [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (n_sensor, n_time)
+            Readings [rad/s].
+
+        Raises
+        ------
+        ValueError
+            If a sensor is missing or unknown, or has not as many readings as are due in the block.
+        """
+        if set(readings) != set(self.model.sensors):
+            msg = f"readings: expected the sensors {sorted(self.model.sensors)}, got {sorted(readings)}"
+            raise ValueError(msg)
+        arrays = [np.asarray(readings[name], dtype=float) for name in self.model.sensors]
+        n_time = arrays[self.model.strides.index(1)].size
+        Z = np.full((len(arrays), n_time), np.nan)
+        for name, stride, values, row in zip(self.model.sensors, self.model.strides, arrays, Z, strict=True):
+            due = row[-self._sample % stride :: stride]
+            if values.shape != due.shape:
+                msg = (
+                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples from {self._sample} on), "
+                    f"got shape {values.shape}"
+                )
+                raise ValueError(msg)
+            due[:] = np.where(np.isfinite(values), values, np.inf)
+        self._sample += n_time
+        return Z

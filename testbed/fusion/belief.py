@@ -1,0 +1,193 @@
+"""What a filter believes about its sensors: a transfer function and white noise, kept apart from what the sensors are."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from testbed.errors import UnknownNameError
+from testbed.parts import Part
+from testbed.units import RateDensity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import control
+
+    from testbed.signals import ComplexArray, FloatArray
+
+Coefficient = Annotated[float, Field(allow_inf_nan=False)]
+
+_CLOSEST_POLES = 1e-3
+
+
+@dataclass(frozen=True)
+class Realisation:
+    """State matrices of one sensor: x' = A x + B u, y = C x + D u; A block diagonal, C of ones and zeros.
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (n_state, n_state), (n_state,), (n_state,)
+        Dynamics [1/s], input [1/s] and output [-].
+    D : float
+        Feed-through [-].
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: float
+
+    def response(self, freq_hz: FloatArray) -> ComplexArray:
+        """Return C (s I - A)^-1 B + D [-] at s = 2 pi j f, complex, shape (n_freq,), for frequencies [Hz] of that shape."""
+        s = 2j * np.pi * np.asarray(freq_hz, float)[:, None, None]
+        state = np.linalg.solve(
+            s * np.eye(self.B.size) - self.A, np.broadcast_to(self.B[:, None], (s.size, self.B.size, 1))
+        )
+        value: ComplexArray = (state[..., 0] @ self.C) + self.D
+        return value
+
+
+class SensorBelief(Part):
+    """Transfer function from true to indicated rate, and white noise before and behind it.
+
+    Parameters
+    ----------
+    numerator, denominator : tuple of float
+        Coefficients in s [rad/s], highest power first.
+    input_noise : float
+        Two-sided root density of the noise that passes the dynamics [rad/sqrt(s)].
+    output_noise : float
+        Two-sided root density of the noise on the reading [rad/sqrt(s)].
+    """
+
+    numerator: tuple[Coefficient, ...]
+    denominator: tuple[Coefficient, ...]
+    input_noise: RateDensity = 0.0
+    output_noise: RateDensity = 0.0
+
+    @model_validator(mode="after")
+    def _check(self) -> SensorBelief:
+        self.realisation()
+        return self
+
+    def transfer_function(self) -> control.TransferFunction:
+        """Return the noise-free dynamics as a python-control transfer function."""
+        import control
+
+        return control.TransferFunction(list(self.numerator), list(self.denominator))
+
+    def realisation(self) -> Realisation:
+        r"""Return the modal realisation whose states are the parts of the reading, so that all are of the size of the rate.
+
+        .. math:: G(s) = D + \sum_i r_i / (s - p_i)
+
+        A real pole is the state x' = p x + r u; a pair is a rotation. The output is the sum of the states (first ones of pairs).
+
+        Returns
+        -------
+        Realisation
+            A [1/s], B [1/s], C [-], D [-], shapes (n, n), (n,), (n,).
+
+        Raises
+        ------
+        ValueError
+            If the transfer function is improper, static or unstable, or poles coincide.
+        """
+        a, b = _monic(np.asarray(self.denominator), np.asarray(self.numerator))
+        poles = np.roots(a).astype(complex)
+        _check_poles(poles)
+        D = float(b[0])
+        residues = (np.polyval(b - D * a, poles) / np.polyval(np.polyder(a), poles)).astype(complex)
+        return _modal(poles, residues, D)
+
+
+def _monic(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return denominator and numerator of equal length, divided by the leading coefficient of the denominator."""
+    a, b = np.trim_zeros(a, "f"), np.trim_zeros(b, "f")
+    if a.size < 2:
+        msg = f"denominator: expected at least one pole, got coefficients {a.tolist()}"
+        raise ValueError(msg)
+    if b.size > a.size:
+        msg = f"numerator: expected a degree of at most {a.size - 1} (the denominator's), got {b.size - 1}"
+        raise ValueError(msg)
+    return a / a[0], np.concatenate([np.zeros(a.size - b.size), b]) / a[0]
+
+
+def _check_poles(poles: ComplexArray) -> None:
+    if np.any(poles.real > 0.0):
+        msg = f"denominator: expected a stable sensor, got the poles {np.round(poles, 6).tolist()} rad/s"
+        raise ValueError(msg)
+    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
+    if np.any(distance < _CLOSEST_POLES * np.abs(poles)):
+        msg = (
+            f"denominator: expected distinct poles, got {np.round(poles, 6).tolist()} rad/s; the modal form needs them apart: "
+            "move one of the coinciding poles by 1 %"
+        )
+        raise ValueError(msg)
+
+
+def _modal(poles: ComplexArray, residues: ComplexArray, D: float) -> Realisation:
+    """Return the block-diagonal realisation of poles [rad/s] and residues [1/s], slowest pole first."""
+    upper = np.flatnonzero(poles.imag >= 0.0)
+    order = upper[np.argsort(np.abs(poles[upper]))]
+    n = poles.size
+    A, B, C = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    i = 0
+    for pole, residue in zip(poles[order], residues[order], strict=True):
+        C[i] = 1.0
+        A[i, i], B[i] = pole.real, residue.real
+        if pole.imag > 0.0:
+            A[i : i + 2, i : i + 2] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
+            B[i : i + 2] = 2.0 * residue.real, -2.0 * residue.imag
+            i += 1
+        i += 1
+    return Realisation(A, B, C, D)
+
+
+@functools.cache
+def _shipped(name: str) -> dict[str, SensorBelief]:
+    from ruamel.yaml import YAML
+
+    folder = resources.files("testbed.fusion") / "beliefs"
+    names = [entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")]
+    if name not in names:
+        kind = "belief"
+        raise UnknownNameError(kind, name, names)
+    content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
+    return {key: SensorBelief.model_validate(value, context={"border": True}) for key, value in content.items()}
+
+
+def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
+    """Return the belief of each sensor.
+
+    Parameters
+    ----------
+    source : str or mapping
+        Name of a shipped belief, or sensor name -> `SensorBelief` or its fields (SI floats or strings with units).
+
+    Returns
+    -------
+    dict of str to SensorBelief
+        One entry per sensor.
+
+    Raises
+    ------
+    UnknownNameError
+        If no belief of that name is shipped.
+    ValueError
+        If a transfer function or a noise is not acceptable.
+    """
+    if isinstance(source, str):
+        return dict(_shipped(source))
+    return {name: SensorBelief.model_validate(value) for name, value in source.items()}
+
+
+def default_belief() -> dict[str, SensorBelief]:
+    """Return equation (39) of paper 1 (doi 10.1109/TIM.2024.3375962) with the noise of the presets."""
+    return load_belief("eq39")

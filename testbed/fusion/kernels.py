@@ -1,0 +1,343 @@
+"""The compiled steps of the filters, for sizes known to the compiler.
+
+`kalman_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of sensors): loops of constant length unroll.
+They close over these two integers only, which numba's disk cache keys by value, so that a second process loads and does not compile.
+All kernels live in this file because that cache watches no other file than the kernel's own.
+
+Readings come as one row per sensor at the fastest rate: NaN where none is due, infinite where one is due but missing (it also breaks the
+chain of differences). Both mean: predict only. Until the first reading nothing is predicted either.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+# Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
+RATE, STD, HEADER_ROWS = 0, 1, 2
+INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
+# Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
+Q_RATE, GUARD_HITS, ADAPTIVE_HEADER_ROWS = 2, 3, 4
+R_USED, INCREMENTS, BAND, INFLATION, ADAPTIVE_ROWS = 2, 3, 4, 5, 6
+
+# One record per sensor: what the adaptation was set to, and what it remembers.
+SENSOR = np.dtype(
+    [
+        ("adapt_R", np.bool_),  # (17)
+        ("adapt_offset", np.bool_),  # (16)
+        ("difference", np.bool_),  # judge by differences of the innovation
+        ("forget", np.float64),  # beta
+        ("power", np.float64),  # beta^k
+        ("offset_power", np.float64),
+        ("R", np.float64),
+        ("offset", np.float64),  # r
+        ("lowest", np.float64),  # bounds of R
+        ("highest", np.float64),
+        ("floor", np.float64),
+        ("clamp", np.float64),  # factor around the band's R, infinite for none
+        ("hits", np.int64),  # times that a bound of R held
+        ("previous_innovation", np.float64),
+        ("previous_reading", np.float64),
+        ("increments", np.int64),  # k - 1
+        ("increment_variance", np.float64),  # N_k / dT
+        ("least_weight", np.float64),  # of a new increment; 0 is the infinite memory of (30)
+        ("wait", np.int64),  # increments before a band is judged
+        ("banded", np.bool_),
+        ("band", np.int64),  # -1 before the first judgement
+        ("thresholds", np.float64, (2,)),
+        ("levels", np.float64, (3,)),
+        ("alpha", np.float64),
+        ("window_sum", np.float64),
+        ("window_count", np.int64),
+    ]
+)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q, exactly symmetric."""
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += F[i, j] * x[j]
+        moved[i] = total
+    for i in range(n):
+        x[i] = moved[i]
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = F[i, 0] * P[0, j]
+        for k in range(1, n):
+            factor = F[i, k]
+            for j in range(n):
+                work[i, j] += factor * P[k, j]
+    for i in range(n):
+        for j in range(i + 1):
+            total = Q[i, j]
+            for k in range(n):
+                total += work[i, k] * F[j, k]
+            P[i, j] = total
+            P[j, i] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovation(x, P, H, i, z, n):  # pragma: no cover
+    """Return (z - H_i x, H_i P H_i')."""
+    e, spread = z, 0.0
+    for j in range(n):
+        total = 0.0
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        e -= H[i, j] * x[j]
+        spread += H[i, j] * total
+    return e, spread
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+    """Apply one scalar reading in Joseph form, P = (I - K h)P(I - K h)' + K R K', its factors applied one after the other."""
+    e, C = z, R
+    for j in range(n):
+        total = 0.0
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        g[j] = total
+    for j in range(n):
+        e -= H[i, j] * x[j]
+        C += H[i, j] * g[j]
+    for j in range(n):
+        K[j] = g[j] / C
+        x[j] += K[j] * e
+    for j in range(n):
+        for k in range(n):
+            P[j, k] -= K[j] * g[k]
+    for j in range(n):
+        total = -R * K[j]
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        g[j] = total
+    for j in range(n):
+        for k in range(j + 1):
+            total = P[j, k] - g[j] * K[k]
+            P[j, k] = total
+            P[k, j] = total
+
+
+@functools.lru_cache
+def kalman_kernel(n: int, n_sensor: int) -> Any:
+    """Return run(x, P, F, Q, H, R, Z, started, out) -> started, the plain Kalman filter over a block.
+
+    x (n,) and P (n, n) are replaced by the posterior of the last step. Z is (n_sensor, n_time);
+    `out` (HEADER_ROWS + INNOVATION_ROWS * n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # pragma: no cover
+        # Local copies have a constant shape, so their index arithmetic folds.
+        x, moved, g, K = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H = np.empty((n_sensor, n))
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        for k in range(Z.shape[1]):
+            if started:
+                predict(x, P, F, Q, work, moved, n)
+            for i in range(n_sensor):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                out[row + INNOVATION, k] = np.nan
+                out[row + INNOVATION_VARIANCE, k] = np.nan
+                if np.isfinite(Z[i, k]):
+                    e, spread = innovation(x, P, H, i, Z[i, k], n)
+                    out[row + INNOVATION, k] = e
+                    out[row + INNOVATION_VARIANCE, k] = spread + R[i]
+            for i in range(n_sensor):
+                if np.isfinite(Z[i, k]):
+                    started = True
+                    update(x, P, H, i, Z[i, k], R[i], g, K, n)
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(P[0, 0])
+        x_in[:], P_in[:] = x, P
+        return started
+
+    return run
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def watch_increments(sensor, z):  # pragma: no cover
+    """Update N_k / dT by (28)-(30): the mean of half the squared increments, or its fading form."""
+    if np.isfinite(sensor.previous_reading):
+        sensor.increments += 1
+        weight = max(1.0 / sensor.increments, sensor.least_weight)
+        step = z - sensor.previous_reading
+        sensor.increment_variance += weight * (0.5 * step * step - sensor.increment_variance)
+    sensor.previous_reading = z
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def judge_band(sensor):  # pragma: no cover
+    """On entering a band of N_k, set R to the band's value; within a band leave R alone."""
+    if not sensor.banded or sensor.increments < sensor.wait:
+        return
+    band = 0
+    for level in range(2):
+        if sensor.increment_variance >= sensor.thresholds[level]:
+            band = level + 1
+    if band != sensor.band:
+        sensor.band = band
+        sensor.R = sensor.levels[band]
+        # A band may set R below the floor; then its own value is the floor.
+        sensor.lowest = min(sensor.R, max(sensor.floor, sensor.R / sensor.clamp))
+        sensor.highest = sensor.R * sensor.clamp
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def inflation(sensor, window, square, C):  # pragma: no cover
+    """Return S of (36): max(1, alpha C_hat / C), C_hat the mean (34) of `square` over the last readings."""
+    if sensor.alpha == 0.0:
+        return 1.0
+    at = sensor.window_count % window.size
+    sensor.window_sum += square - window[at]
+    window[at] = square
+    sensor.window_count += 1
+    if at == window.size - 1:
+        # Once a lap the sum is formed anew: the rounding left by one huge innovation must not stay for ever.
+        sensor.window_sum = window.sum()
+    mean = sensor.window_sum / min(sensor.window_count, window.size)
+    return max(1.0, sensor.alpha * mean / C)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_R(sensor, square, spread):  # pragma: no cover
+    """Apply (17), R <- (1 - d)R + d(square - spread) with d = (1 - beta)/(1 - beta^(k+1)), within the bounds of R."""
+    sensor.power *= sensor.forget
+    d = (1.0 - sensor.forget) / (1.0 - sensor.power)
+    R = (1.0 - d) * sensor.R + d * (square - spread)
+    if sensor.lowest > R:
+        R = sensor.lowest
+        sensor.hits += 1
+    elif sensor.highest < R:
+        R = sensor.highest
+        sensor.hits += 1
+    sensor.R = R
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_offset(sensor, e):  # pragma: no cover
+    """Apply (16), r <- (1 - d)r + d(z - H x_prior); the innovation `e` has r taken off already."""
+    sensor.offset_power *= sensor.forget
+    d = (1.0 - sensor.forget) / (1.0 - sensor.offset_power)
+    sensor.offset += d * e
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def observe(sensor, window, x, P, H, i, z, row, n):  # pragma: no cover
+    """Prepare the use of a reading: N_k, band, innovation and S; fill its `row` of diagnostics.
+
+    Return the innovation (11), H P H', the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
+    """
+    watch_increments(sensor, z)
+    judge_band(sensor)
+    e, spread = innovation(x, P, H, i, z - sensor.offset, n)
+    square = e * e
+    if sensor.difference:
+        square = 0.5 * (e - sensor.previous_innovation) ** 2
+    C = spread + sensor.R
+    factor = 1.0
+    if np.isfinite(square):
+        factor = inflation(sensor, window, square, C)
+    row[INNOVATION] = e
+    row[INNOVATION_VARIANCE] = C
+    row[R_USED] = sensor.R
+    row[INCREMENTS] = sensor.increment_variance if sensor.increments > 0 else np.nan
+    row[BAND] = sensor.band if sensor.band >= 0 else np.nan
+    row[INFLATION] = factor
+    return e, spread, square, factor * sensor.R
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def learn(sensor, e, square, spread):  # pragma: no cover
+    """Adapt R and r of a sensor after its reading was used."""
+    if sensor.adapt_R and np.isfinite(square):
+        adapt_R(sensor, square, spread)
+    if sensor.adapt_offset:
+        adapt_offset(sensor, e)
+    sensor.previous_innovation = e
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_Q(Q, chosen, x, x_prior, P, P_prior, d, n):  # pragma: no cover
+    """Apply (15) with +P to the chosen diagonal elements of Q; return how many the guard at zero held.
+
+    K e is x - x_prior, and A P_prev A' is P_prior - Q.
+    """
+    hits = 0
+    for j in range(n):
+        if chosen[j]:
+            moved = x[j] - x_prior[j]
+            value = Q[j, j] + d * (moved * moved + P[j, j] - P_prior[j])
+            if value < 0.0:
+                value = 0.0
+                hits += 1
+            Q[j, j] = value
+    return hits
+
+
+@functools.lru_cache
+def adaptive_kernel(n: int, n_sensor: int) -> Any:
+    """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
+
+    As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of the sliding windows
+    in `windows` (n_sensor, n_window), the diagonal elements of Q that adapt in `chosen` (n,), and `progress` = [started, beta^k, guard hits of Q].
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # pragma: no cover
+        x, x_prior, P_prior = np.empty(n), np.empty(n), np.empty(n)
+        moved, g, K = np.empty(n), np.empty(n), np.empty(n)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H = np.empty((n_sensor, n))
+        e, square, spread, R = np.empty(n_sensor), np.empty(n_sensor), np.empty(n_sensor), np.empty(n_sensor)
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        adapts_Q = chosen.any()
+        for k in range(Z.shape[1]):
+            predicted = progress[0] > 0.0
+            if predicted:
+                predict(x, P, F, Q, work, moved, n)
+            for i in range(n_sensor):
+                row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
+                for m in range(ADAPTIVE_ROWS):
+                    out[row + m, k] = np.nan
+                if not np.isfinite(Z[i, k]):
+                    continue
+                e[i], spread[i], square[i], R[i] = observe(sensors[i], windows[i], x, P, H, i, Z[i, k], out[row:, k], n)
+            if adapts_Q:
+                for j in range(n):
+                    x_prior[j] = x[j]
+                    P_prior[j] = P[j, j]
+            read = False
+            hits = 0
+            for i in range(n_sensor):
+                if np.isfinite(Z[i, k]):
+                    read = True
+                    update(x, P, H, i, Z[i, k] - sensors[i].offset, R[i], g, K, n)
+                    learn(sensors[i], e[i], square[i], spread[i])
+                elif np.isinf(Z[i, k]):
+                    sensors[i].previous_innovation = np.nan
+                    sensors[i].previous_reading = np.nan
+                hits += sensors[i].hits
+            if read and predicted and adapts_Q:
+                progress[1] *= forget
+                d = (1.0 - forget) / (1.0 - progress[1])
+                progress[2] += adapt_Q(Q, chosen, x, x_prior, P, P_prior, d, n)
+            if read:
+                progress[0] = 1.0
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(P[0, 0])
+            out[Q_RATE, k] = Q[0, 0]
+            out[GUARD_HITS, k] = hits + progress[2]
+        x_in[:], P_in[:], Q_in[:] = x, P, Q
+
+    return run

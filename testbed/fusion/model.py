@@ -1,0 +1,201 @@
+r"""The augmented linear model of the fusion filters, equations (7), (18)-(20) of paper 1 for any signal order and any sensors.
+
+State x = [x_1, its m - 1 derivatives, states of sensor 1, states of sensor 2, ...]. x_1 [rad/s] is the true rate, driven through m integrators
+by white noise of density q; it drives every sensor, whose white input noise enters beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import block_diag, expm
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.signals import FloatArray
+
+# Derivatives of the rate are kept per 10 ms, so that they are of the rate's own size in the band of interest.
+_TIME_UNIT = 1e-2
+_START_STD = math.radians(1.0)
+# The sensor states start close to rest but not certain: 1e-6 (deg/s)^2 would keep an error of the first reading for tens of seconds.
+_START_STD_SENSOR = math.radians(1e-2)
+_START_FREQ_HZ = 100.0
+
+
+@dataclass(frozen=True)
+class FusionModel:
+    """Discrete model at the fastest rate: x+ = F x + w, z = H x + v, cov w = Q, var v = R.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Names of the rows of H.
+    sample_rate_hz : float
+        The fastest rate [Hz].
+    strides : tuple of int
+        Sensor i has a reading at every strides[i]-th step.
+    F, Q, P0 : ndarray, shape (n_state, n_state)
+        Transition [-], covariance of a step and of the start [rad^2/s^2].
+    H : ndarray, shape (n_sensor, n_state)
+        Readings from states [-].
+    R : ndarray, shape (n_sensor,)
+        Variance of a reading [rad^2/s^2].
+    """
+
+    sensors: tuple[str, ...]
+    sample_rate_hz: float
+    strides: tuple[int, ...]
+    F: FloatArray
+    Q: FloatArray
+    H: FloatArray
+    R: FloatArray
+    P0: FloatArray
+
+
+def build_model(
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    *,
+    order: int,
+    q: float,
+    use_input_noise: bool = True,
+) -> FusionModel:
+    """Assemble and discretise the model of the sensors that have a sample rate.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Dynamics and noise of each sensor.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+    order : int
+        Number m of integrators between the white noise and the rate.
+    q : float
+        Two-sided density of that noise [rad^2/s^(2m+1)].
+    use_input_noise : bool, optional
+        Count the sensors' input noise as process noise; False is the form of the paper.
+
+    Returns
+    -------
+    FusionModel
+        With R = output_noise^2 * sample rate [rad^2/s^2].
+
+    Raises
+    ------
+    ValueError
+        If a sensor has no belief, or a rate is not positive or does not divide the fastest one.
+
+    References
+    ----------
+    Paper 1 (doi 10.1109/TIM.2024.3375962), equations (7), (18)-(20).
+    """
+    sensors = tuple(sample_rate_hz)
+    missing = [name for name in sensors if name not in belief]
+    if missing or not sensors:
+        msg = f"belief: expected one for each of {list(sensors)}, got {list(belief)}"
+        raise ValueError(msg)
+    fastest, strides = _strides(sample_rate_hz)
+    believed = [belief[name] for name in sensors]
+    A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
+    F, Q = van_loan(A, Qc, 1.0 / fastest)
+    R = np.array([one.output_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
+    return FusionModel(sensors, fastest, strides, F, Q, H, R, _start_covariance(order, F.shape[0]))
+
+
+def _strides(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
+    for name, value in sample_rate_hz.items():
+        if not (math.isfinite(value) and value > 0.0):
+            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
+            raise ValueError(msg)
+    fastest = float(max(sample_rate_hz.values()))
+    strides = tuple(round(fastest / value) for value in sample_rate_hz.values())
+    for (name, value), stride in zip(sample_rate_hz.items(), strides, strict=True):
+        # A nanosecond of drift per second of record is below any logger's clock.
+        if not math.isclose(stride * value, fastest, rel_tol=1e-9):
+            msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
+            raise ValueError(msg)
+    return fastest, strides
+
+
+def _start_covariance(order: int, n_state: int) -> FloatArray:
+    std = np.full(n_state, _START_STD_SENSOR)
+    std[:order] = _START_STD * (2.0 * np.pi * _START_FREQ_HZ * _TIME_UNIT) ** np.arange(order)
+    return np.diag(std**2)
+
+
+def continuous_model(
+    believed: list[SensorBelief], *, order: int, q: float, use_input_noise: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (A, Qc, H) in continuous time.
+
+    Parameters
+    ----------
+    believed : list of SensorBelief
+        One per sensor, in the order of the rows of H.
+    order, q, use_input_noise : int, float, bool
+        As for `build_model`; q [rad^2/s^(2m+1)].
+
+    Returns
+    -------
+    A, Qc, H : ndarray, shapes (n_state, n_state), (n_state, n_state), (n_sensor, n_state)
+        Dynamics [1/s], density of the white noise [rad^2/s^3], output rows [-].
+
+    Raises
+    ------
+    ValueError
+        If a sensor with feed-through has input noise: it would be output noise too, correlated with the process.
+    """
+    realisations = [one.realisation() for one in believed]
+    chain = np.diag(np.full(order - 1, 1.0 / _TIME_UNIT), 1)
+    A = block_diag(chain, *(one.A for one in realisations))
+    Qc = np.zeros_like(A)
+    Qc[order - 1, order - 1] = q * _TIME_UNIT ** (2 * (order - 1))
+    H = np.zeros((len(believed), A.shape[0]))
+    at = order
+    for i, (sensor, one) in enumerate(zip(believed, realisations, strict=True)):
+        part = slice(at, at + one.B.size)
+        A[part, 0] = one.B
+        H[i, part], H[i, 0] = one.C, one.D
+        if use_input_noise and sensor.input_noise > 0.0:
+            if one.D != 0.0:
+                msg = f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; give it as output_noise, or add a pole"
+                raise ValueError(msg)
+            Qc[part, part] = sensor.input_noise**2 * np.outer(one.B, one.B)
+        at = part.stop
+    return A, Qc, H
+
+
+def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, FloatArray]:
+    r"""Discretise x' = A x + white noise of density Qc over a step T.
+
+    .. math:: F = e^{A T}, \quad Q = \int_0^T e^{A s} Q_c e^{A' s} ds
+
+    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or cancel otherwise.
+
+    Parameters
+    ----------
+    A, Qc : ndarray, shape (n_state, n_state)
+        Dynamics [1/s] and density of the white noise [state^2/s].
+    T : float
+        Step [s].
+
+    Returns
+    -------
+    F, Q : ndarray, shape (n_state, n_state)
+        Transition [-] and covariance [state^2], symmetric.
+    """
+    n = A.shape[0]
+    doublings = max(0, math.ceil(math.log2(max(float(np.linalg.norm(A, 1)) * T, 1e-300))))
+    step = T / 2**doublings
+    power = expm(np.block([[-A, Qc], [np.zeros((n, n)), A.T]]) * step)
+    F: FloatArray = power[n:, n:].T.copy()
+    Q: FloatArray = F @ power[:n, n:]
+    for _ in range(doublings):
+        Q = Q + F @ Q @ F.T
+        F = F @ F
+    return F, 0.5 * (Q + Q.T)
