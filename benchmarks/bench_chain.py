@@ -61,7 +61,9 @@ def main(duration: float = 60.0) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for length in (2.0, duration):
             path = Path(folder) / "scenario.yaml"
-            path.write_text(text.replace("duration: 20 s", f"duration: {length} s").replace("settle: 10 s", "settle: 1 s"))
+            path.write_text(
+                text.replace("duration: 20 s", f"duration: {length} s").replace("settle: 10 s", "settle: 1 s")
+            )
             scenario = testbed.load_scenario(path)
             spent.clear()
             begin = time.process_time()

@@ -19,11 +19,17 @@ PROGRAM = (
 
 def peak_mb(duration: float, mode: str) -> float:
     text = (ROOT / "scenarios" / "mixed_0p5hz_10hz.yaml").read_text().split("expect:")[0]
-    text = text.replace("duration: 20 s", f"duration: {duration} s").replace("settle: 10 s", "settle: 1 s").replace("{preset: air_bearing}", f"{{mode: {mode}}}")
+    text = (
+        text.replace("duration: 20 s", f"duration: {duration} s")
+        .replace("settle: 10 s", "settle: 1 s")
+        .replace("{preset: air_bearing}", f"{{mode: {mode}}}")
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scenario.yaml"
         path.write_text(text)
-        done = subprocess.run([sys.executable, "-c", PROGRAM, str(path), f"{folder}/run"], check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, str(path), f"{folder}/run"], check=True, capture_output=True, text=True
+        )
     return float(done.stdout.splitlines()[-1])
 
 

@@ -29,7 +29,12 @@ def main(repeats: int = 7) -> None:
     text = (ROOT / "scenarios" / "mixed_0p5hz_10hz.yaml").read_text()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "one_second.yaml"
-        path.write_text(text.replace("duration: 20 s", "duration: 1 s").replace("settle: 10 s", "settle: 0.5 s").replace("expect:", "description2:").split("description2:")[0])
+        path.write_text(
+            text.replace("duration: 20 s", "duration: 1 s")
+            .replace("settle: 10 s", "settle: 0.5 s")
+            .replace("expect:", "description2:")
+            .split("description2:")[0]
+        )
         cases = {
             "import of the libraries": ("-c", f"import {LIBRARIES}"),
             "testbed run, 1 s": ("-m", "testbed", "run", str(path)),
@@ -44,7 +49,9 @@ def main(repeats: int = 7) -> None:
     medians = {label: statistics.median(values) for label, values in times.items()}
     for label, value in medians.items():
         print(f"{label:<26}{value:7.2f} s")
-    print(f"run / import              {medians['testbed run, 1 s'] / medians['import of the libraries']:7.2f}   (promised: at most 2)")
+    print(
+        f"run / import              {medians['testbed run, 1 s'] / medians['import of the libraries']:7.2f}   (promised: at most 2)"
+    )
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def schema() -> dict[str, Any]:
     definitions: dict[str, Any] = {}
 
     def part(model: type[Any]) -> dict[str, Any]:
-        raw = model.model_json_schema(ref_template="#/$defs/{model}")
+        raw: dict[str, Any] = model.model_json_schema(ref_template="#/$defs/{model}")
         definitions.update(raw.pop("$defs", {}))
         return raw
 

@@ -91,7 +91,7 @@ def view(run_dir: RunDir) -> None:
     """Open the recording of a run in the Rerun viewer."""
     from testbed.viewer import open_viewer
 
-    open_viewer(run_dir)
+    raise typer.Exit(FAILED if open_viewer(run_dir) else OK)
 
 
 @app.command()

@@ -120,7 +120,7 @@ class ErrorMetrics:
         fit, *_ = np.linalg.lstsq(self._gram, self._with_error, rcond=None)
         rest = (self._square - 2.0 * fit @ self._with_error + fit @ self._gram @ fit) / self._n
         lines = sum(a**2 * (abs(g) - 1.0) ** 2 / 2.0 for a, g in gains if g is not None)
-        return _finite(np.rad2deg(np.sqrt(max(rest, 0.0) + lines)))
+        return _finite(np.rad2deg(np.sqrt(max(float(rest), 0.0) + lines)))
 
 
 def _phasors(gram: FloatArray, projection: FloatArray) -> list[complex]:

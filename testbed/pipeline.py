@@ -10,6 +10,7 @@ import numpy as np
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import TruthBlock, Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
+from testbed.sensors.base import ProfiledStage
 from testbed.signals import random_stream
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[Ru
 
 def _sense(stage: SensorStage, rate: FloatArray, start: int) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
     """Return the readings of a block, and the velocity profiles of a sensor that has them."""
-    if not hasattr(stage, "profile"):
+    if not isinstance(stage, ProfiledStage):
         return stage.process(rate), None
     # A profile belongs to the last sample that went in, so the block is cut behind every pose sample.
     ends = [k + 1 for k in range(-start % POSE_STRIDE, rate.size, POSE_STRIDE)]

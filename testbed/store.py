@@ -231,7 +231,7 @@ def write_scenario(folder: Path, resolved: dict[str, Any], versions: Mapping[str
     )
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.sort_base_mapping_type_on_output = False
     yaml.width = 4096
     with (folder / "scenario.yaml").open("w", encoding="utf-8") as stream:
         stream.write(head + "\n")

@@ -92,9 +92,9 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     table = Table(title=title, title_justify="left")
     for heading in (
         "",
-        "RMSE [deg/s]",
-        "aligned [deg/s]",
-        "claimed std",
+        "RMSE deg/s",
+        "aligned deg/s",
+        "claimed std deg/s",
         "x floor",
         *(f"{line:g} Hz gain, phase" for line in shown),
     ):
@@ -153,7 +153,8 @@ def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
     """Print what there is to choose from."""
     console = _console()
+    width = max(len(name) for names in table.values() for name in names)
     for kind, names in table.items():
         console.print(f"[bold]{kind}s[/bold]")
         for name, line in names.items():
-            console.print(f"  {name:<24}{line}", soft_wrap=True, highlight=False)
+            console.print(f"  {name:<{width}}  {line}", soft_wrap=True, highlight=False)

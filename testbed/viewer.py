@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from testbed.errors import RunError
+from testbed.errors import RunError, ScenarioError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -184,7 +184,7 @@ def _recording_of(run_dir: Path) -> Path:
     recording = Path(run_dir) / RECORDING
     if not recording.is_file():
         msg = f"{run_dir}: expected a run folder with {RECORDING}; make one with `testbed run SCENARIO.yaml`"
-        raise RunError(msg)
+        raise ScenarioError(msg)
     return recording
 
 

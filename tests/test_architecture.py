@@ -38,7 +38,7 @@ def room_of(path):
 @pytest.mark.contract
 @pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in ROOMS], ids=lambda p: str(p.relative_to(ROOT)))
 def test_rooms_import_one_way(path):
-    """signals <- models <- sensors; fusion knows neither, so the truth cannot leak into a filter."""
+    """Signals <- models <- sensors; fusion knows neither, so the truth cannot leak into a filter."""
     room = room_of(path)
     assert set(imports_of(path)) <= FOUNDATION | ROOMS[room] | {room}
 
@@ -86,12 +86,19 @@ def test_docstring_names_every_argument(name):
     function = item.__init__ if inspect.isclass(item) else item
     if "Parameters\n---" not in doc or not inspect.isfunction(inspect.unwrap(function)):
         return
-    arguments = [p for p in inspect.signature(function).parameters if p not in {"self", "data", "args", "kwargs"} and not p.startswith("_")]
+    arguments = [
+        p
+        for p in inspect.signature(function).parameters
+        if p not in {"self", "data", "args", "kwargs"} and not p.startswith("_")
+    ]
     assert [argument for argument in arguments if not documented(doc, argument)] == []
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("name", [name for name in sorted(CALLABLES) if inspect.isclass(CALLABLES[name]) and issubclass(CALLABLES[name], Part)])
+@pytest.mark.parametrize(
+    "name",
+    [name for name in sorted(CALLABLES) if inspect.isclass(CALLABLES[name]) and issubclass(CALLABLES[name], Part)],
+)
 def test_docstring_of_a_parameter_set_names_every_field(name):
     """What `testbed list` and the schema offer is explained where it is defined; inherited fields where they are inherited from."""
     item = CALLABLES[name]
@@ -100,7 +107,9 @@ def test_docstring_of_a_parameter_set_names_every_field(name):
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("name", [name for name in sorted(CALLABLES) if "ndarray" in (inspect.getdoc(CALLABLES[name]) or "")])
+@pytest.mark.parametrize(
+    "name", [name for name in sorted(CALLABLES) if "ndarray" in (inspect.getdoc(CALLABLES[name]) or "")]
+)
 def test_docstring_of_an_array_has_its_shape(name):
     for line in (inspect.getdoc(CALLABLES[name]) or "").splitlines():
         if re.search(r"\bndarray\b", line) and " : " in line:

@@ -95,7 +95,9 @@ def test_an_occupied_output_folder_ends_with_2(tmp_path):
 
 def test_a_diverging_run_ends_with_3_and_says_how_far_it_got(tmp_path):
     """A feed-forward that believes in ten times the inertia asks for 11 N m where the motion itself needs 1.1 N m of the motor's 6 N m."""
-    path = short_file(tmp_path, ("{preset: air_bearing}", "{feedforward_inertia_error: 9}"), ("frequency: 10 Hz", "frequency: 200 Hz"))
+    path = short_file(
+        tmp_path, ("{preset: air_bearing}", "{feedforward_inertia_error: 9}"), ("frequency: 10 Hz", "frequency: 200 Hz")
+    )
     result = call("run", path, cwd=tmp_path)
     assert_clear(result, 3)
     assert "saturated" in result.stderr

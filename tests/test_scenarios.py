@@ -33,7 +33,7 @@ def test_scenario_meets_its_expectations_with_margin(path):
 
 @pytest.fixture(scope="module")
 def truths():
-    """The truth of each judged signal, on the turntable: it does not depend on the seed, so it is computed once."""
+    """Return the truth of each judged signal, on the turntable: it does not depend on the seed, so it is computed once."""
     runs = {}
     for name in TABLE_II:
         scenario = testbed.load_scenario(next(path for path in SCENARIOS if path.stem == name))
@@ -48,7 +48,10 @@ def rmse_over_seeds(truths, signal, method):
     late = truth.time >= scenario.frame.settle
     values = []
     for seed in SEEDS:
-        readings = {name: sensor.start(BASE_RATE_HZ, seed, name).process(truth[f"{name}_rate"]) for name, sensor in scenario.sensors.items()}
+        readings = {
+            name: sensor.start(BASE_RATE_HZ, seed, name).process(truth[f"{name}_rate"])
+            for name, sensor in scenario.sensors.items()
+        }
         error = estimate(method, readings, sample_rate_hz=rates).rate - truth.rate
         values.append(float(np.rad2deg(np.sqrt(np.mean(error[late] ** 2)))))
     return values
@@ -60,7 +63,9 @@ def test_one_parameter_set_meets_table_ii_on_all_four_signals(truths, method):
     """Paper 1's own column, against the physics of table and sensors: median over ten seeds, and no seed beyond it by half."""
     for signal, limit in TABLE_II.items():
         values = rmse_over_seeds(truths, signal, method)
-        print(f"{method} {signal}: median {statistics.median(values):.4f}, worst {max(values):.4f} deg/s, paper {limit}")
+        print(
+            f"{method} {signal}: median {statistics.median(values):.4f}, worst {max(values):.4f} deg/s, paper {limit}"
+        )
         assert statistics.median(values) <= limit
         assert max(values) <= 1.5 * limit
 

@@ -155,7 +155,7 @@ def test_an_interrupted_run_leaves_nothing_behind_and_the_earlier_one_alone(tmp_
 
 def test_open_run_says_what_is_missing(tmp_path):
     with pytest.raises(
-        ScenarioError, match="expected a run folder, but scenario.yaml, run.nc, metrics.json is missing"
+        ScenarioError, match=r"expected a run folder, but scenario\.yaml, run\.nc, metrics\.json is missing"
     ):
         open_run(tmp_path)
     for name in ESSENTIAL:
@@ -186,7 +186,7 @@ def test_failures_of_the_file_system_name_their_cause():
 
 def test_signals_name_what_there_is(stored):
     _, run, _ = stored
-    with pytest.raises(AttributeError, match="no signal 'ratte' .there are time, rate"):
+    with pytest.raises(AttributeError, match=r"no signal 'ratte' \(there are time, rate"):
         _ = run.sensors["mhd_ars"].ratte
     assert "rate" in dir(run.truth)
     with pytest.raises(KeyError):

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from testbed import viewer
-from testbed.errors import RunError
+from testbed.errors import RunError, ScenarioError
 from testbed.viewer import headless_viewer, open_viewer
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="asks for DISPLAY, /proc or a POSIX shell")
@@ -28,7 +28,7 @@ def stand_in(tmp_path, monkeypatch, script):
 
 
 def test_folder_without_recording_is_named_with_the_remedy(tmp_path):
-    with pytest.raises(RunError, match=r"expected a run folder with recording\.rrd; make one with `testbed run"):
+    with pytest.raises(ScenarioError, match=r"expected a run folder with recording\.rrd; make one with `testbed run"):
         open_viewer(tmp_path)
 
 

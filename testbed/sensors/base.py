@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -22,6 +22,16 @@ class SensorStage(Protocol):
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
+
+
+@runtime_checkable
+class ProfiledStage(SensorStage, Protocol):
+    """An instrument with a fluid inside, whose velocity profile can be looked at."""
+
+    heights: FloatArray
+
+    def profile(self) -> FloatArray:
+        """Return the slip at `heights` [m] as of the last sample that went in [rad/s], shape (n_height,)."""
 
 
 class Sensor(Part):

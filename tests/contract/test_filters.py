@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ def test_any_blocks_give_the_same_bits(name, sizes):
     arrays = readings()
     blocks = [
         parts.process({"mhd_ars": arrays["mhd_ars"][a:b], "mems_gyro": arrays["mems_gyro"][-(-a // 10) : -(-b // 10)]})
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+        for a, b in pairwise(cuts)
     ]
     assert np.array_equal(np.concatenate([b.rate for b in blocks]), whole.rate)
     assert np.array_equal(np.concatenate([b.std for b in blocks]), whole.std)

@@ -94,7 +94,7 @@ class Recorded(Motion):
         t, rate = self._read()
         power = np.abs(np.fft.rfft(rate)) ** 2
         below = np.cumsum(power) / max(float(np.sum(power)), np.finfo(float).tiny)
-        return float(np.searchsorted(below, 1.0 - _BAND_POWER)) / (t[-1] - t[0])
+        return float(np.searchsorted(below, 1.0 - _BAND_POWER) / (t[-1] - t[0]))
 
     def _read(self) -> tuple[FloatArray, FloatArray]:
         """Return time [s] and rate [rad/s], even and finite."""
