@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from testbed.palette import mix, rgb
+from testbed.recording.stream import FRAMES, Batch
 from testbed.recording.world import INK, nice_ceiling
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ class Channel:
         self.entity = f"/sensors/{sensor}/channel"
         self._recording, self._heights, self._color = recording, heights, color
         self._largest = 0.0
+        self._batch = Batch(self._send, FRAMES)
         wanted = np.array(FRACTIONS) * heights.max()
         self.probes = np.abs(heights[:, np.newaxis] - wanted).argmin(axis=0)
         names = [f"u(h = {heights[node] * 1e3:.2f} mm) [rad/s]" for node in self.probes]
@@ -59,16 +61,18 @@ class Channel:
         profiles : ndarray, shape (n_pose, n_height)
             Velocity of the fluid relative to the wall, per radius [rad/s].
         """
-        if not index.size:
-            return
-        self._largest = max(self._largest, float(np.abs(profiles).max()))
+        self._largest = max(self._largest, float(np.abs(profiles).max(initial=0.0)))
+        self._batch.add(index, profiles)
+
+    def _send(self, index: NDArray[np.int64], profiles: FloatArray) -> None:
         points = np.stack(np.broadcast_arrays(profiles, self._heights), axis=-1).astype(np.float32)
         self._recording.columns(f"{self.entity}/profile", index, rr.LineStrips2D.columns(strips=points))
         velocity = np.ascontiguousarray(profiles[:, self.probes])
         self._recording.columns(f"{self.entity}/velocity", index, rr.Scalars.columns(scalars=velocity))
 
     def finish(self) -> None:
-        """Draw the axes, whose range is known only now."""
+        """Send what is held back and draw the axes, whose range is known only now."""
+        self._batch.flush()
         full = nice_ceiling(self._largest or 1.0)
         top = float(self._heights.max())
         to_box = rr.Transform3D(scale=[WIDTH / 2 / full, -HEIGHT / top, 1.0])

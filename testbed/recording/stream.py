@@ -11,14 +11,15 @@ from testbed.palette import rgb
 from testbed.recording.envelope import Envelope
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
     from testbed.signals import FloatArray
 
 TIMELINE = "sim_time"
-ROWS = 16384  # rows sent at once; the viewer cuts chunks to 4096 rows anyway
+ROWS = 16384  # rows of scalars sent at once; the viewer cuts chunks to 4096 rows anyway
+FRAMES = 512  # rows of poses and profiles, which are larger
 
 
 class Clock:
@@ -76,6 +77,37 @@ class Recording:
         self.static(entity, style)
 
 
+class Batch:
+    """Rows held back until there are enough of them: Rerun keeps an entry in memory for every chunk, so many small ones add up.
+
+    Parameters
+    ----------
+    send : callable
+        Takes the base samples and the values of all rows.
+    size : int
+        Rows sent at once [-].
+    """
+
+    def __init__(self, send: Callable[..., None], size: int) -> None:
+        self._send, self._size = send, size
+        self._waiting: list[tuple[NDArray[np.generic], ...]] = []
+        self._n_waiting = 0
+
+    def add(self, index: NDArray[np.int64], *values: FloatArray) -> None:
+        """Add rows at the base samples `index`, shape (n_row,); each of `values` has shape (n_row, ...)."""
+        if index.size:
+            self._waiting.append((index, *values))
+            self._n_waiting += index.size
+        if self._n_waiting >= self._size:
+            self.flush()
+
+    def flush(self) -> None:
+        """Send what is held back."""
+        if self._n_waiting:
+            self._send(*(np.concatenate(part) for part in zip(*self._waiting, strict=True)))
+        self._waiting, self._n_waiting = [], 0
+
+
 class Signal:
     """One scalar signal of the recording: its samples pass an `Envelope` and are sent in large chunks.
 
@@ -109,27 +141,17 @@ class Signal:
         self.entity = entity
         self._recording, self._stride = recording, stride
         self._envelope = recording.clock.envelope(stride, detailed=detailed)
-        self._waiting: list[tuple[NDArray[np.int64], FloatArray]] = []
-        self._n_waiting = 0
+        self._batch = Batch(self._send, ROWS)
         recording.lines(entity, [name], [color], width)
 
     def write(self, values: FloatArray) -> None:
         """Add the next samples [unit of the entity]."""
-        self._add(*self._envelope.process(values))
+        self._batch.add(*self._envelope.process(values))
 
     def finish(self) -> None:
         """Send what is still held back."""
-        self._add(*self._envelope.finish())
-        self._send()
+        self._batch.add(*self._envelope.finish())
+        self._batch.flush()
 
-    def _add(self, index: NDArray[np.int64], values: FloatArray) -> None:
-        self._waiting.append((index, values))
-        self._n_waiting += index.size
-        if self._n_waiting >= ROWS:
-            self._send()
-
-    def _send(self) -> None:
-        if self._n_waiting:
-            index, values = (np.concatenate(part) for part in zip(*self._waiting, strict=True))
-            self._recording.columns(self.entity, index * self._stride, rr.Scalars.columns(scalars=values))
-        self._waiting, self._n_waiting = [], 0
+    def _send(self, index: NDArray[np.int64], values: FloatArray) -> None:
+        self._recording.columns(self.entity, index * self._stride, rr.Scalars.columns(scalars=values))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
@@ -10,6 +11,7 @@ import rerun as rr
 
 from testbed.palette import TRUTH, rgb
 from testbed.recording.bodies import draw_bodies
+from testbed.recording.stream import FRAMES, Batch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,6 +50,7 @@ class World:
 
     def __init__(self, recording: Recording, model: mujoco.MjModel, colors: Mapping[str, str]) -> None:
         self._recording = recording
+        self._bodies: dict[str, Batch] = {}
         self._angles: list[FloatArray] = []
         self._index: list[NDArray[np.int64]] = []
         self._rotor = rotor_extent(model)
@@ -69,14 +72,22 @@ class World:
             Angle of the table [rad].
         """
         for body, (position, quaternion) in poses.items():
-            # MuJoCo puts the scalar part first, Rerun last.
-            columns = rr.Transform3D.columns(translation=position, quaternion=quaternion[:, [1, 2, 3, 0]])
-            self._recording.columns(f"/world/{body}", index, columns)
+            if body not in self._bodies:
+                self._bodies[body] = Batch(partial(self._send, body), FRAMES)
+            self._bodies[body].add(index, position, quaternion)
         self._index.append(index)
-        self._angles.append(angle)
+        # A copy: a view would keep the whole block alive.
+        self._angles.append(angle.copy())
+
+    def _send(self, body: str, index: NDArray[np.int64], position: FloatArray, quaternion: FloatArray) -> None:
+        # MuJoCo puts the scalar part first, Rerun last.
+        columns = rr.Transform3D.columns(translation=position, quaternion=quaternion[:, [1, 2, 3, 0]])
+        self._recording.columns(f"/world/{body}", index, columns)
 
     def finish(self) -> None:
-        """Draw the dial, whose magnification is known only when the largest angle is."""
+        """Send what is held back and draw the dial, whose magnification is known only when the largest angle is."""
+        for batch in self._bodies.values():
+            batch.flush()
         index, angle = np.concatenate(self._index), np.concatenate(self._angles)
         step, factor = dial_scale(float(np.abs(angle).max(initial=0.0)))
         _draw_dial(self._recording, self._rotor, step, factor)

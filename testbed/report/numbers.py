@@ -30,6 +30,20 @@ def significant(value: float | None, digits: int = 3) -> str:
     return f"{mantissa}×10{str(power).translate(_SUPERSCRIPT)}".replace("-", "−")
 
 
+def decade(value: float) -> str:
+    """Return a power of ten as text, such as 10⁻³; the digits outside 1e-2 to 1e2 only, and nothing for other numbers.
+
+    Parameters
+    ----------
+    value : float
+        Number on a logarithmic axis, any unit.
+    """
+    power = round(math.log10(value))
+    if abs(value / 10.0**power - 1.0) > 1e-9:
+        return ""
+    return plain(value) if abs(power) <= 2 else f"10{str(power).translate(_SUPERSCRIPT)}"
+
+
 def fixed(value: float | None, decimals: int) -> str:
     """Return `value` with `decimals` decimals; a dash for None and NaN."""
     if value is None or not math.isfinite(value):

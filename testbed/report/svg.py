@@ -26,7 +26,6 @@ STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 5),
-    "axes.formatter.use_mathtext": True,
     "text.color": INK,
     "xtick.color": INK,
     "ytick.color": INK,
