@@ -49,13 +49,14 @@ class Bands(Part):
 
 
 def _default_bands(wait_gyro: float, wait_mhd: float) -> dict[str, Bands]:
+    # Thresholds: calibrated on the sweep of examples/calibrate_bands.py, two digits kept.
     square = DEG**2
     return {
         "mems_gyro": Bands(
-            thresholds=(6e-6 * square, 3.5e-5 * square), R=(1e-4 * square, 1e-3 * square, 1e-2 * square), wait=wait_gyro
+            thresholds=(1.0e-5 * square, 3.8e-5 * square), R=(1e-4 * square, 1e-3 * square, 1e-2 * square), wait=wait_gyro
         ),
         "mhd_ars": Bands(
-            thresholds=(7e-7 * square, 1.7e-6 * square),
+            thresholds=(7.0e-7 * square, 1.5e-6 * square),
             R=(6.5e-7 * square, 2e-7 * square, 1e-7 * square),
             wait=wait_mhd,
         ),

@@ -189,7 +189,7 @@ def test_calibration_on_a_sweep_gives_thresholds_like_the_defaults(reference: An
         for name, rate_hz in RATES.items():
             levels[name].append(increment_variance(readings[name][int(settle * rate_hz) :]))
     for name, bands in ArwShakfParameters().bands.items():
-        # The defaults are rounded figures between the same band edges.
+        # The linear sensors of this test stand in for the physics on which the defaults were calibrated (tests/test_examples.py).
         ratio = np.array(calibrate_bands(freq_hz, np.array(levels[name]))) / bands.thresholds
         assert np.all((ratio > 0.5) & (ratio < 2.0)), (name, ratio)
 

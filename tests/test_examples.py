@@ -1,0 +1,35 @@
+"""The examples do what they say, and the defaults that come from them still do."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from testbed.fusion.arw_shakf import ArwShakf
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def example(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_default_thresholds_are_those_of_the_calibration_sweep():
+    """Two digits were kept: 5 %. The scatter of N_k over n = 20000 readings, sqrt(3/n) = 1.2 %, is inside that."""
+    calibrated = example("calibrate_bands").thresholds()
+    for name, bands in ArwShakf.Parameters().bands.items():
+        assert np.allclose(calibrated[name], bands.thresholds, rtol=0.05, atol=0.0), name
+
+
+def test_calibration_sweep_leaves_the_judged_signals_out():
+    sweep = example("calibrate_bands").SWEEP_HZ
+    assert not set(sweep) & {0.5, 4.0, 10.0}
+    assert sweep[0] == 0.1
+    assert sweep[-1] == 25.0
