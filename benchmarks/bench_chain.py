@@ -17,11 +17,11 @@ from testbed.fusion import FILTERS
 from testbed.judge import Judge
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable import Turntable
+from testbed.netcdf import NetcdfStore
 from testbed.parts import resolve
 from testbed.recording import RecordingWriter
 from testbed.sensors.mems_gyro import MemsGyroStage
 from testbed.sensors.mhd_ars import MhdArsStage
-from testbed.store import NetcdfStore
 
 ROOT = Path(__file__).parents[1]
 STAGES = {

@@ -8,11 +8,9 @@ import numpy as np
 
 from testbed.errors import ScenarioError
 from testbed.metrics import METRICS
-from testbed.models.motion import MotionProfile
 from testbed.models.servo import required_torque
 from testbed.models.table_modes import check_modes
 from testbed.scenario import BASE_RATE_HZ, Scenario
-from testbed.signals import random_stream
 
 if TYPE_CHECKING:
     from testbed.document import Document
@@ -139,12 +137,7 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
 
 def command_peaks(scenario: Scenario) -> tuple[float, float]:
     """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
-    frame = scenario.frame
-    terms = [
-        motion.start(frame.duration, random_stream(frame.seed, "motion", str(i), kind))
-        for i, (kind, motion) in enumerate(scenario.motion)
-    ]
-    profile = MotionProfile(terms, frame.ramp_in, BASE_RATE_HZ)
+    profile = scenario.profile()
     peak_rate = peak_torque = 0.0
     for start in range(0, scenario.n_time, _BLOCK):
         command = profile.process(min(_BLOCK, scenario.n_time - start))

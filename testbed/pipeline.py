@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.models.motion import CommandBlock, MotionProfile
-from testbed.models.turntable import TruthBlock, Turntable
+from testbed.errors import RunError
+from testbed.models.turntable import Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.sensors.base import ProfiledStage
-from testbed.signals import random_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from testbed.fusion import EstimateBlock
+    from testbed.models.motion import CommandBlock
+    from testbed.models.turntable import TruthBlock
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
@@ -64,16 +65,11 @@ class Chain:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        frame = scenario.frame
-        terms = [
-            motion.start(frame.duration, random_stream(frame.seed, "motion", str(i), kind))
-            for i, (kind, motion) in enumerate(scenario.motion)
-        ]
-        self._motion = MotionProfile(terms, frame.ramp_in, BASE_RATE_HZ)
+        self._motion = scenario.profile()
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
         self.turntable = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE)
         self._sensors = {
-            name: sensor.start(BASE_RATE_HZ, frame.seed, name) for name, sensor in scenario.sensors.items()
+            name: sensor.start(BASE_RATE_HZ, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
         }
         rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
         self._fusion = {
@@ -94,8 +90,18 @@ class Chain:
             readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: stage.process(readings) for name, stage in self._fusion.items()}
+        estimates = {name: self._estimate(name, readings) for name in self._fusion}
         return RunBlock(command.start, command, truth, readings, estimates, profiles)
+
+    def _estimate(self, name: str, readings: Mapping[str, FloatArray]) -> EstimateBlock:
+        """Return the estimate of a filter, which may be a user's own: one value per reading of the fastest sensor."""
+        estimate: EstimateBlock = self._fusion[name].process(readings)
+        n_time = max(values.size for values in readings.values())
+        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
+            if np.shape(values) != (n_time,):
+                msg = f"filter {name}: expected {signal} of shape ({n_time},), got {np.shape(values)}"
+                raise RunError(msg)
+        return estimate
 
 
 def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[RunBlock]]:

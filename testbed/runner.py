@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import testbed
 from testbed.interrupt import held_interrupts
 from testbed.judge import Judge
+from testbed.netcdf import NetcdfStore
 from testbed.pipeline import simulate
 from testbed.results import MemoryStore, Run, assemble
-from testbed.store import NetcdfStore, RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
+from testbed.store import RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
 
 if TYPE_CHECKING:
     from collections.abc import Callable

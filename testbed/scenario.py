@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
+from testbed.models.motion import MotionProfile
 from testbed.parts import Part
+from testbed.signals import random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
@@ -122,6 +124,15 @@ class Scenario:
         """From when to when the recording holds every sample [s]."""
         start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + 2.0)
         return start, min(stop, self.frame.duration)
+
+    def profile(self) -> MotionProfile:
+        """Return the commanded motion from its start; ScenarioError if a recorded one cannot be read."""
+        seed, duration = self.frame.seed, self.frame.duration
+        terms = [
+            motion.start(duration, random_stream(seed, "motion", str(i), kind))
+            for i, (kind, motion) in enumerate(self.motion)
+        ]
+        return MotionProfile(terms, self.frame.ramp_in, BASE_RATE_HZ)
 
     def with_seed(self, seed: int) -> Scenario:
         """Return the same scenario under another seed."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import testbed
+from testbed.errors import RunError
 from tests.scenes import short
 
 
@@ -106,3 +107,27 @@ def test_a_run_without_sensors_or_filters_has_truth_only(tmp_path):
     assert run.truth.rate.size == 10_000
     assert not run.sensors
     assert not run.fusion
+
+
+OWN_FILTER = """
+import numpy as np
+from testbed.fusion import EstimateBlock
+
+class Mine:
+    def __init__(self, belief, sample_rate_hz, parameters):
+        self.gain, self.lost = parameters["gain"], parameters.get("lost", 0)
+
+    def process(self, readings):
+        rate = self.gain * readings["mhd_ars"]
+        return EstimateBlock(rate[: rate.size - self.lost], np.ones(rate.size), {})
+"""
+
+
+def test_a_users_own_filter_runs_from_yaml_and_its_shapes_are_checked(tmp_path, monkeypatch):
+    (tmp_path / "own_pipeline_filter.py").write_text(OWN_FILTER)
+    monkeypatch.syspath_prepend(tmp_path)
+    entry = "  arw_shakf: {type: own_pipeline_filter:Mine, gain: 2.0}"
+    run = testbed.run(short(tmp_path, ("  arw_shakf: {}", entry)))
+    assert np.array_equal(run.fusion["arw_shakf"].rate, 2.0 * run.sensors["mhd_ars"].rate)
+    with pytest.raises(RunError, match=r"filter arw_shakf: expected rate of shape \(10000,\), got \(9999,\)"):
+        testbed.run(short(tmp_path, ("  arw_shakf: {}", entry.replace("2.0", "2.0, lost: 1"))))

@@ -134,7 +134,7 @@ def test_a_run_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
     def broken(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("testbed.store.NetcdfStore.write", broken)
+    monkeypatch.setattr("testbed.netcdf.NetcdfStore.write", broken)
     with pytest.raises(RunError, match="the disk is full"):
         testbed.run(short(tmp_path), out=tmp_path / "run")
     assert [p.name for p in tmp_path.iterdir()] == ["short.yaml"]

@@ -53,7 +53,9 @@ def _default_bands(wait_gyro: float, wait_mhd: float) -> dict[str, Bands]:
     square = DEG**2
     return {
         "mems_gyro": Bands(
-            thresholds=(1.0e-5 * square, 3.8e-5 * square), R=(1e-4 * square, 1e-3 * square, 1e-2 * square), wait=wait_gyro
+            thresholds=(1.0e-5 * square, 3.8e-5 * square),
+            R=(1e-4 * square, 1e-3 * square, 1e-2 * square),
+            wait=wait_gyro,
         ),
         "mhd_ars": Bands(
             thresholds=(7.0e-7 * square, 1.5e-6 * square),
