@@ -88,7 +88,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progre
 
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder(out))
-        stack.enter_context(failing_as_run_error(str(out)))
+        reach = stack.enter_context(failing_as_run_error(str(out)))
         check_interrupt = stack.enter_context(held_interrupts())
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain)
@@ -113,6 +113,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progre
             )
         )
         for part in blocks:
+            reach(part.start / chain.rates["base"])
             for sink in (netcdf, judge, recording):
                 sink.write(part)
             if progress is not None:

@@ -17,7 +17,7 @@ from testbed.errors import Problem, RunError, ScenarioError
 from testbed.results import Run, Signals, assemble
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from typing import Self
 
     from testbed.signals import FloatArray
@@ -111,13 +111,23 @@ def write_scenario(folder: Path, resolved: dict[str, Any], versions: Mapping[str
 
 
 @contextlib.contextmanager
-def failing_as_run_error(what: str) -> Iterator[None]:
-    """Turn failures of the file system (disk full, quota, read-only) inside the context into RunError."""
+def failing_as_run_error(what: str) -> Iterator[Callable[[float], None]]:
+    """Turn failures of the file system (disk full, quota, read-only) inside the context into RunError.
+
+    Yields a function that notes how far the run got [s], for the message.
+    """
+    reached: float | None = None
+
+    def note(seconds: float) -> None:
+        nonlocal reached
+        reached = seconds
+
     try:
-        yield
+        yield note
     except OSError as error:
         reason = "the disk is full" if error.errno in {errno.ENOSPC, errno.EDQUOT} else str(error)
-        msg = f"{what} could not be written: {reason}"
+        far = "" if reached is None else f"; the run got as far as t = {reached:g} s"
+        msg = f"{what} could not be written: {reason}{far}"
         raise RunError(msg) from error
 
 

@@ -117,6 +117,7 @@ def limit_file_size():
 def test_a_full_disk_ends_with_3_and_leaves_nothing(tmp_path):
     result = call("run", short_file(tmp_path), cwd=tmp_path, preexec_fn=limit_file_size)
     assert_clear(result, 3)
+    assert "the run got as far as t = 0 s" in result.stderr
     assert not list(tmp_path.glob("runs/*"))
     assert not list(tmp_path.glob("runs/.*"))
 
