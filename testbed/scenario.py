@@ -140,10 +140,6 @@ class Scenario:
 
     def resolved(self) -> dict[str, Any]:
         """Return the whole scenario as a mapping with SI units, which loads to the same scenario again."""
-
-        def dump(part: BaseModel) -> dict[str, Any]:
-            return part.model_dump(mode="json", context={"border": True}, exclude_none=True)
-
         return {
             **dump(self.frame),
             "turntable": dump(self.turntable),
@@ -159,10 +155,15 @@ class Scenario:
         }
 
 
+def dump(part: BaseModel) -> dict[str, Any]:
+    """Return a part as a mapping with SI units that validates to the same part; what is unset by default and unset here is left out."""
+    written = part.model_dump(mode="json", context={"border": True})
+    fields = type(part).model_fields
+    return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
 def _parameters(spec: FilterSpec) -> dict[str, Any]:
-    if isinstance(spec.parameters, BaseModel):
-        return spec.parameters.model_dump(mode="json", context={"border": True}, exclude_none=True)
-    return dict(spec.parameters)
+    return dump(spec.parameters) if isinstance(spec.parameters, BaseModel) else dict(spec.parameters)
 
 
 def _expectations(bounds: tuple[Bound, ...]) -> dict[str, dict[str, str]]:

@@ -125,7 +125,7 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
 def print_scenario(scenario: Scenario) -> None:
     """Print every key of a scenario: as written, and in SI."""
     console = _console()
-    written = {key: f"{value} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
+    written = {key: f"{_plain_list(value)} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
         _leaves(dict(scenario.source))
     )
     table = Table(
@@ -133,9 +133,13 @@ def print_scenario(scenario: Scenario) -> None:
     )
     for key, value in _leaves(scenario.resolved()):
         if value not in ("", None):
-            table.add_row(key, str(written.get(key, "")), str(value))
+            table.add_row(key, _plain_list(written.get(key, "")), _plain_list(value))
     console.print(table)
     console.print("The scenario is valid.")
+
+
+def _plain_list(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -257,3 +257,12 @@ def test_load_of_a_damaged_scenario_gives_a_scenario_or_one_clear_error(tmp_path
     path = tmp_path_factory.mktemp("damaged") / "scenario.yaml"
     path.write_text(GOOD[:position] + replacement + GOOD[position + 1 :], encoding="utf-8", errors="ignore")
     assert_scenario_or_clear_error(path)
+
+
+def test_an_explicit_null_survives_the_round_trip(tmp_path):
+    """`memory: null` is the infinite memory of (30), not the default of one second."""
+    scenario = load(tmp_path, GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: arw_shakf, memory: null}"))
+    write_scenario(tmp_path, scenario.resolved(), {})
+    again = load_scenario(tmp_path / "scenario.yaml")
+    assert again.fusion["kalman"].parameters.memory is None
+    assert again.resolved() == scenario.resolved()
