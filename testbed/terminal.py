@@ -135,6 +135,12 @@ def print_scenario(scenario: Scenario) -> None:
         if value not in ("", None):
             table.add_row(key, str(written.get(key, "")), str(value))
     console.print(table)
+    for name, sensor in scenario.sensors.items():
+        if rows := sensor.datasheet():
+            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
+            for row in rows:
+                sheet.add_row(*row)
+            console.print(sheet)
     console.print("The scenario is valid.")
 
 
