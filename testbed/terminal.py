@@ -103,6 +103,9 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         for name, row in metrics[kind].items():
             table.add_row(*_row(name, row, shown), end_section=name == list(metrics[kind])[-1])
     console.print(table)
+    for name, row in metrics["sensors"].items():
+        if row.get("missing"):
+            console.print(f"{name}: {row['missing']} readings lost")
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
         console.print(
