@@ -9,7 +9,9 @@ import pytest
 
 import testbed
 from testbed.errors import ScenarioError
+from testbed.pipeline import _sense
 from testbed.report.digest import _bridged
+from testbed.sensors.base import Surroundings
 from testbed.terminal import print_metrics, print_scenario
 from tests.scenes import short
 
@@ -72,7 +74,9 @@ def test_temperature_reaches_the_gyro_and_survives_the_round_trip(tmp_path):
     still = ("sine: {frequency: 10 Hz, rate: 1 deg/s}", "static: {}")
     edits = [cold, still, ("preset: air_bearing", "mode: fixed"), ("  kalman: {}\n  arw_shakf: {}", "  kalman: {}")]
     scenario = short(tmp_path, *edits, ramp)
-    readings = np.rad2deg(testbed.run(scenario).sensors["mems_gyro"].rate)
+    run = testbed.run(scenario)
+    assert np.array_equal(testbed.run(scenario, block=0.07).sensors["mems_gyro"].rate, run.sensors["mems_gyro"].rate)
+    readings = np.rad2deg(run.sensors["mems_gyro"].rate)
     t = np.arange(1000) / 2000.0
     # A ramp of 0.2 deg/s per second through (154.537 s + 15.626) / (5.2175 s^2 + 148 s + 15.444): behind the pole at
     # 28.3 rad/s it lags by 1/28.3 s, the slow pole and zero at 0.1 rad/s nearly cancel: within 1 % of the final value.
@@ -81,6 +85,34 @@ def test_temperature_reaches_the_gyro_and_survives_the_round_trip(tmp_path):
     assert scenario.resolved()["temperature"] == {"start": "298.15 K", "stop": "308.15 K", "over": "0.5 s"}
     assert short(tmp_path, *edits).resolved()["temperature"] == "298.15 K"
     assert not testbed.run(short(tmp_path, *edits)).sensors["mems_gyro"].rate.any()
+
+
+class Thermometer:
+    """A stage with a fluid inside that reads the temperature: what an MHD sensor with temperature terms looks like."""
+
+    def __init__(self):
+        self.heights, self.last = np.zeros(1), np.nan
+
+    def process(self, true_rate):
+        raise NotImplementedError
+
+    def process_in(self, true_rate, surroundings):
+        if true_rate.size:
+            self.last = surroundings.temperature[-1]
+        return surroundings.temperature - surroundings.cross_rate[:, 0] + surroundings.specific_force[:, 2]
+
+    def profile(self):
+        return np.array([self.last])
+
+
+def test_surroundings_are_cut_with_the_block():
+    k = np.arange(1000.0)
+    around = Surroundings(np.outer(k, [1, 0]), np.outer(k, [0, 0, 2]), 300 + k)
+    readings, profile = _sense(Thermometer(), k, 100, around)
+    assert np.array_equal(readings, 300 + 2 * k)
+    # Pose samples of a block that starts at 100 are at 400, 800: its samples 300 and 700.
+    assert profile is not None
+    assert np.array_equal(profile[1][:, 0], [600.0, 1000.0])
 
 
 def test_temperature_is_checked_with_its_line(tmp_path):

@@ -11,11 +11,13 @@ import pytest
 from pydantic import ValidationError
 
 from testbed.models.temperature import TemperatureProfile
-from testbed.sensors import load_preset
+from testbed.sensors import load_preset, mems_gyro, noise
 from testbed.sensors.allan import allan_deviation
 from testbed.sensors.base import Surroundings
+from testbed.sensors.gyro_errors import Fir
 from testbed.sensors.mems_gyro import MemsGyro
 from testbed.sensors.noise import GyroNoise
+from testbed.signals import random_stream
 
 FS = 20_000.0
 # No low-pass, no rounding to speak of: what is left is the term under test.
@@ -127,15 +129,15 @@ def test_fir_response_is_the_closed_form() -> None:
     # A triangle of 2 n - 1 weights, of any scale, is the mean over n, twice.
     triangle = 7.0 * np.convolve(np.ones(10), np.ones(10))
     np.testing.assert_allclose(bare(fir=tuple(triangle)).response(freq), dirichlet(freq, 10) ** 2, rtol=0, atol=1e-13)
+    # Newest first: 3/4 of this sample and 1/4 of the one before.
+    np.testing.assert_allclose(
+        bare(fir=(3.0, 1.0)).response(freq), (3.0 + np.exp(-2j * np.pi * freq / FS)) / 4.0, rtol=1e-13
+    )
 
 
 def phasor(readings: Any, freq: float, sample_rate: float) -> complex:
     turn = np.exp(-2j * np.pi * freq * np.arange(readings.size) / sample_rate)
     return complex(2.0 * np.mean(readings * turn))
-    # Newest first: 3/4 of this sample and 1/4 of the one before.
-    np.testing.assert_allclose(
-        bare(fir=(3.0, 1.0)).response(freq), (3.0 + np.exp(-2j * np.pi * freq / FS)) / 4.0, rtol=1e-13
-    )
 
 
 @pytest.mark.oracle
@@ -217,11 +219,11 @@ def test_switching_a_random_term_off_leaves_the_others_bit_identical() -> None:
         assert np.array_equal(np.isnan(other), ~there)
         assert not np.array_equal(other[there], whole[there])
     still = noisy(angle_random_walk=1e-4)
-    noise = still.sample(np.zeros(2000), FS, seed=1)
+    alone = still.sample(np.zeros(2000), FS, seed=1)
     shifted = still.model_copy(update={"turn_on_bias": 0.01}).sample(np.zeros(2000), FS, seed=1)
     # The same noise on another bias, to the count.
-    assert np.ptp(shifted - noise) <= 2.1e-8
-    assert abs(shifted[0] - noise[0]) > 1e-5
+    assert np.ptp(shifted - alone) <= 2.1e-8
+    assert abs(shifted[0] - alone[0]) > 1e-5
 
 
 @pytest.mark.parametrize("sizes", [[1] * 40 + [19_960], [3, 9, 4990, 14_998], [777] * 25 + [575]])
@@ -236,6 +238,32 @@ def test_any_blocks_give_the_same_bits_with_all_errors(sizes: list[int], errors:
     stage = sensor.start(FS, 3, "gyro")
     parts = [stage.process_in(rate[a:b], around.part(a, b)) for a, b in pairwise(np.cumsum([0, *sizes]))]
     assert np.array_equal(np.concatenate(parts), whole, equal_nan=True)
+
+
+@pytest.mark.parametrize("n_tap", [1, 3, 10, 40])
+def test_decimation_filter_gives_the_same_bits_before_any_rounding(n_tap: int) -> None:
+    random = np.random.default_rng(6)
+    weights, u = random.random(n_tap), random.standard_normal(5000)
+    fir = Fir(weights)
+    parts = [fir.process(part) for part in np.split(u, [0, 1, 2, 7, 100, 3333])]
+    assert np.array_equal(np.concatenate(parts), Fir(weights).process(u))
+
+
+def test_every_random_term_has_a_stream_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[Any, ...]] = []
+
+    def recorded(*key: Any) -> Any:
+        drawn.append(key)
+        return random_stream(*key)
+
+    for module in (mems_gyro, noise):
+        monkeypatch.setattr(module, "random_stream", recorded)
+    terms = {**TERMS, **ALL}
+    noisy(**terms).start(FS, 7, "left")
+    # Every term but the ramp, and the three of the clock and the switch.
+    assert len(drawn) == len(TERMS) - 1 + 3
+    assert len(set(drawn)) == len(drawn)
+    assert {key[:2] for key in drawn} == {(7, "left")}
 
 
 def test_inputs_are_left_alone() -> None:
