@@ -11,6 +11,7 @@ import testbed
 from testbed.errors import ScenarioError
 from testbed.pipeline import _sense
 from testbed.report.digest import _bridged
+from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
 from testbed.terminal import print_metrics, print_scenario
 from tests.scenes import short
@@ -138,6 +139,22 @@ def test_a_tilted_gyro_feels_gravity_and_the_cross_axis_undoes_its_tilt(tmp_path
     # of itself for the first seconds, before its slow pole lets go.
     leaning = (rate("g_sensitivity: [1 deg/s/g0, 0 deg/s/g0, 0 deg/s/g0]") - plain)[600:]
     np.testing.assert_allclose(np.rad2deg(leaning), -np.sin(0.05), rtol=0.06)
+
+
+def test_a_gyro_off_the_axis_feels_the_turning_in_its_g_sensitivity(tmp_path):
+    """Mode fixed, 0.1 m off along x: the tangential acceleration r dw/dt along y, here 10 Hz times 1 deg/s."""
+    edits = [("preset: air_bearing", "mode: fixed"), ("  kalman: {}\n  arw_shakf: {}", "  kalman: {}")]
+    keys = "g_sensitivity: [0 deg/s/g0, 1 deg/s/g0, 0 deg/s/g0], noise: off"
+
+    def rate(x):
+        scenario = short(tmp_path, *edits, gyro(f"mounting: {{position: [{x}, 0 m, 0 m]}}, {keys}"))
+        return testbed.run(scenario).sensors["mems_gyro"].rate[400:]
+
+    felt = rate("0.1 m") - rate("0 m")
+    # 300 ms of 10 Hz are whole periods of a steady tone; what is left of the start decays within 2 %.
+    gain = abs(load_preset("adis16505_filtered").response([10.0])[0])
+    expected = np.deg2rad(1.0) / 9.80665 * 0.1 * 2 * np.pi * 10.0 * np.deg2rad(1.0) * gain / np.sqrt(2.0)
+    assert np.sqrt(np.mean(felt**2)) == pytest.approx(expected, rel=0.02, abs=0)
 
 
 def test_the_markov_bias_of_paper_1_is_a_key_of_its_own(tmp_path):

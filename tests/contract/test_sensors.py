@@ -108,6 +108,13 @@ def test_preset_survives_the_round_trip_through_its_resolved_form(name):
     assert type(sensor).model_validate(written, context={"border": True}) == sensor
 
 
+@pytest.mark.parametrize("name", PRESETS)
+def test_datasheet_is_rows_of_text(name):
+    rows = load_preset(name).datasheet()
+    assert all(isinstance(text, str) and text for row in rows for text in row)
+    assert len(dict(rows)) == len(rows)
+
+
 # What a key needs beside it to mean something, by sensor type.
 COMPANIONS = {
     "markov_time": {"markov_bias": 1e-3},
