@@ -30,7 +30,9 @@ class Judge:
     def __init__(self, scenario: Scenario, chain: Chain) -> None:
         self._scenario = scenario
         self._rates = chain.rates
-        self._errors = {name: ErrorMetrics(scenario.lines) for name in (*scenario.sensors, *scenario.fusion)}
+        # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
+        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
+        self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""

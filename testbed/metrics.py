@@ -19,6 +19,7 @@ METRICS = (
     "inside_2_std",
     "floor_rmse_deg_s",
     "optimum_rmse_deg_s",
+    "missing",
 )
 
 
@@ -36,10 +37,13 @@ class ErrorMetrics:
     ----------
     lines : sequence of float
         Commanded line frequencies [Hz].
+    gaps : bool, optional
+        NaN estimates are lost readings: left out and counted as `missing`. Otherwise they leave the result undefined.
     """
 
-    def __init__(self, lines: Sequence[float]) -> None:
+    def __init__(self, lines: Sequence[float], *, gaps: bool = False) -> None:
         self._lines = tuple(lines)
+        self._gaps, self._missing = gaps, 0
         n = 2 * len(self._lines)
         self._n = 0
         self._square = 0.0
@@ -62,6 +66,10 @@ class ErrorMetrics:
         std : ndarray, shape (n_time,), optional
             Standard deviation that the filter claims [rad/s].
         """
+        if self._gaps:
+            there = ~np.isnan(estimate)
+            self._missing += int(t.size - np.count_nonzero(there))
+            t, estimate, truth = t[there], estimate[there], truth[there]
         if not t.size:
             return
         error = estimate - truth
@@ -78,9 +86,10 @@ class ErrorMetrics:
             self._inside += int(np.count_nonzero(np.abs(error) <= 2.0 * std))
 
     def result(self) -> dict[str, Any]:
-        """Return the metrics in deg/s and degrees, None where undefined."""
+        """Return the metrics in deg/s and degrees, None where undefined; `missing` is the number of lost readings."""
+        missing = {"missing": self._missing} if self._gaps else {}
         if not self._n:
-            return {"rmse_deg_s": None, "rmse_aligned_deg_s": None, "peak_error_deg_s": None, "lines": []}
+            return {"rmse_deg_s": None, "rmse_aligned_deg_s": None, "peak_error_deg_s": None, "lines": [], **missing}
         gains = self._gains()
         return {
             "rmse_deg_s": _finite(np.rad2deg(np.sqrt(self._square / self._n))),
@@ -94,6 +103,7 @@ class ErrorMetrics:
                 }
                 for line, (_, g) in zip(self._lines, gains, strict=True)
             ],
+            **missing,
         }
 
     def consistency(self) -> dict[str, Any]:

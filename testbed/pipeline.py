@@ -10,7 +10,7 @@ import numpy as np
 from testbed.errors import RunError
 from testbed.models.turntable import Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
-from testbed.sensors.base import ProfiledStage
+from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -67,7 +67,11 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion = scenario.profile()
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        self.turntable = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE)
+        exposed = [name for name, sensor in scenario.sensors.items() if sensor.exposed]
+        self.turntable = Turntable(
+            scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE, exposed=exposed
+        )
+        self._temperature = scenario.frame.temperature
         self._sensors = {
             name: sensor.start(BASE_RATE_HZ, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
         }
@@ -87,7 +91,7 @@ class Chain:
         truth = self.turntable.process(command)
         readings, profiles = {}, {}
         for name, stage in self._sensors.items():
-            readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start)
+            readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start, self._around(name, truth))
             if profile is not None:
                 profiles[name] = profile
         estimates = {name: self._estimate(name, readings) for name in self._fusion}
@@ -102,6 +106,10 @@ class Chain:
                 msg = f"filter {name}: expected {signal} of shape ({n_time},), got {np.shape(values)}"
                 raise RunError(msg)
         return estimate
+
+    def _around(self, name: str, truth: TruthBlock) -> Surroundings:
+        temperature = self._temperature.at(truth.start, truth.rate.size, BASE_RATE_HZ)
+        return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
 
 
 def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[RunBlock]]:
@@ -119,17 +127,25 @@ def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[Ru
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 
-def _sense(stage: SensorStage, rate: FloatArray, start: int) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
+def _sense(
+    stage: SensorStage, rate: FloatArray, start: int, around: Surroundings
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
     """Return the readings of a block, and the velocity profiles of a sensor that has them."""
+
+    def feed(begin: int, end: int) -> FloatArray:
+        if isinstance(stage, ExposedStage):
+            return stage.process_in(rate[begin:end], around.part(begin, end))
+        return stage.process(rate[begin:end])
+
     if not isinstance(stage, ProfiledStage):
-        return stage.process(rate), None
+        return feed(0, rate.size), None
     # A profile belongs to the last sample that went in, so the block is cut behind every pose sample.
     ends = [k + 1 for k in range(-start % POSE_STRIDE, rate.size, POSE_STRIDE)]
     readings, profiles, done = [], [], 0
     for end in ends:
-        readings.append(stage.process(rate[done:end]))
+        readings.append(feed(done, end))
         profiles.append(stage.profile())
         done = end
-    readings.append(stage.process(rate[done:]))
+    readings.append(feed(done, rate.size))
     heights = stage.heights
     return np.concatenate(readings), (heights, np.array(profiles).reshape(len(profiles), heights.size))

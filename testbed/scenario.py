@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field
 
 from testbed.models.motion import MotionProfile
+from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
 from testbed.signals import random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
@@ -40,6 +41,8 @@ class Frame(Part):
         Metrics start here [s].
     ramp_in : float, optional
         Smooth ramp-in of the motion [s].
+    temperature : TemperatureProfile, optional
+        Of every instrument with temperature terms, such as ``25 degC``, or from `start` to `stop` over a time [K].
     bandwidth : float, optional
         Bandwidth W of the noise floor in the metrics [Hz].
     detail : tuple of two floats, optional
@@ -52,6 +55,7 @@ class Frame(Part):
     duration: PositiveDuration
     settle: Duration = 0.0
     ramp_in: Duration = 0.5
+    temperature: TemperatureProfile = ROOM
     bandwidth: Frequency = 1000.0
     detail: tuple[Duration, Duration] | None = None
 

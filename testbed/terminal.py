@@ -103,6 +103,9 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         for name, row in metrics[kind].items():
             table.add_row(*_row(name, row, shown), end_section=name == list(metrics[kind])[-1])
     console.print(table)
+    for name, row in metrics["sensors"].items():
+        if row.get("missing"):
+            console.print(f"{name}: {row['missing']} readings lost")
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
         console.print(
@@ -135,6 +138,12 @@ def print_scenario(scenario: Scenario) -> None:
         if value not in ("", None):
             table.add_row(key, _plain_list(written.get(key, "")), _plain_list(value))
     console.print(table)
+    for name, sensor in scenario.sensors.items():
+        if rows := sensor.datasheet():
+            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
+            for row in rows:
+                sheet.add_row(*row)
+            console.print(sheet)
     console.print("The scenario is valid.")
 
 

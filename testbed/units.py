@@ -2,6 +2,7 @@
 
 Angle and cycle are dimensions of their own, so that `10 rad/s` is no frequency, `1 Hz` no rate and `4 mrad` no number.
 Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(Hz)` and `deg/sqrt(h)` are both rad/sqrt(s).
+A temperature is absolute in `degC` and `K`; in a compound unit such as `ppm/degC` both are the same step. `g0` is standard gravity, `g` a gram.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import functools
 import math
 import re
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import TYPE_CHECKING, Annotated, Any
 
 import pint
@@ -30,6 +32,9 @@ meter = [length] = m
 gram = [mass] = g
 ampere = [current] = A
 kelvin = [temperature] = K
+celsius_step = kelvin = degC
+percent = 0.01
+ppm = 1e-6
 radian = [angle] = rad
 cycle = [cycle]
 count = [count] = LSB
@@ -48,11 +53,13 @@ watt = joule / second = W
 volt = watt / ampere = V
 ohm = volt / ampere
 siemens = ampere / volt = S
+standard_gravity = 9.80665 * meter / second ** 2 = g0
 tesla = volt * second / meter ** 2 = T
 henry = volt * second / ampere = H
 farad = ampere * second / volt = F
 """
 
+_ICE_POINT = Decimal("273.15")
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)\w*)\s*(.*)", re.IGNORECASE | re.DOTALL
 )
@@ -69,7 +76,7 @@ def _registry() -> pint.UnitRegistry:
 def _factor(unit: str, si: str, *, cycle_is_number: bool) -> float:
     """Return the factor from `unit` to `si`; ValueError with the expectation if the dimensions differ."""
     registry = _registry()
-    text = unit.replace("^", "**")
+    text = unit.replace("^", "**").replace("%", "percent")
     text = re.sub(r"sqrt\(([^()]*)\)", r"((\1)**0.5)", text)
     try:
         given = registry.Quantity(1.0, registry.parse_units(text)).to_base_units()
@@ -94,7 +101,7 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     text : str
         Such as ``0.15 deg/sqrt(h)``.
     si : str
-        The unit of the result, such as ``rad*s^-0.5``.
+        The unit of the result, such as ``rad*s^-0.5``; empty for a ratio, which needs no unit.
     example : str, optional
         A correct value, for the message.
     cycle_is_number : bool, optional
@@ -110,7 +117,7 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     ValueError
         If the number, the unit or the dimension is wrong; NaN and infinity are refused.
     """
-    expected = f"expected a quantity in {si}" + (f", such as {example!r}" if example else "")
+    expected = _expectation(si, example)
     match = _NUMBER.fullmatch(text)
     if match is None:
         msg = f"{expected}, got {text!r}"
@@ -119,18 +126,27 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     if not math.isfinite(number):
         msg = f"{expected}, got {text!r}, which is not finite"
         raise ValueError(msg)
-    if not unit:
+    if not unit and si:
         msg = f"{expected}, got {text!r}: the unit is missing"
         raise ValueError(msg)
     try:
-        value = number * _factor(unit, si, cycle_is_number=cycle_is_number)
+        value = number * _factor(unit, si, cycle_is_number=cycle_is_number) if unit else number
     except ValueError as error:
         msg = f"{expected}, got {text!r}: {error}"
         raise ValueError(msg) from error
+    if (unit, si) == ("degC", "K"):
+        # In decimals, so that 25 degC and 298.15 K are the same bits.
+        value = float(Decimal(match[1]) + _ICE_POINT)
     if not math.isfinite(value):
         msg = f"{expected}, got {text!r}, which is not finite"
         raise ValueError(msg)
     return value
+
+
+def _expectation(si: str, example: str) -> str:
+    return (f"expected a quantity in {si}" if si else "expected a ratio") + (
+        f", such as {example!r}" if example else ""
+    )
 
 
 @dataclass(frozen=True)
@@ -142,7 +158,7 @@ class Quantity:
     Parameters
     ----------
     unit : str
-        SI unit of the float.
+        SI unit of the float; empty for a ratio, which YAML may also give as a plain number.
     example : str
         A correct value, shown in messages and in the schema.
     above, at_least, at_most : float, optional
@@ -172,9 +188,9 @@ class Quantity:
         if isinstance(value, str):
             return parse(value, self.unit, example=self.example, cycle_is_number=self.cycle_is_number)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {value!r}"
+            msg = f"{_expectation(self.unit, self.example)}, got {value!r}"
             raise ValueError(msg)
-        if border:
+        if border and self.unit:
             msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {value!r}: the unit is missing"
             raise ValueError(msg)
         return float(value)
@@ -199,10 +215,12 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
+        if not self.unit:
+            return {"type": ["string", "number"], "description": "ratio", "examples": [self.example]}
         return {"type": "string", "description": f"quantity in {self.unit}", "examples": [self.example]}
 
     def _write(self, value: float, info: Any) -> str | float:
-        return f"{value!r} {self.unit}" if (info.context or {}).get("border") else value
+        return f"{value!r} {self.unit}" if self.unit and (info.context or {}).get("border") else value
 
 
 Angle = Annotated[float, Quantity("rad", "5 mrad")]
@@ -229,6 +247,12 @@ MagneticField = Annotated[float, Quantity("T", "0.448 T", at_least=0.0)]
 MassDensity = Annotated[float, Quantity("kg/m^3", "13534 kg/m^3", above=0.0)]
 Viscosity = Annotated[float, Quantity("Pa*s", "1.526 mPa*s", above=0.0)]
 Conductivity = Annotated[float, Quantity("S/m", "1.04e6 S/m", above=0.0)]
+Temperature = Annotated[float, Quantity("K", "25 degC", above=0.0)]
+Ratio = Annotated[float, Quantity("", "200 ppm")]
+Probability = Annotated[float, Quantity("", "1 %", at_least=0.0, at_most=1.0)]
+RatioPerKelvin = Annotated[float, Quantity("K^-1", "10 ppm/K")]
+RatePerKelvin = Annotated[float, Quantity("rad/s/K", "0.005 deg/s/K")]
+RatePerAcceleration = Annotated[float, Quantity("rad*s/m", "0.01 deg/s/g0")]
 Voltage = Annotated[float, Quantity("V", "10 V", above=0.0)]
 ScaleFactor = Annotated[float, Quantity("V*s/rad", "20 mV/(deg/s)", above=0.0)]
 WordScale = Annotated[float, Quantity("rad/s", "0.38 udeg/s", above=0.0)]

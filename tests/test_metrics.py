@@ -78,6 +78,26 @@ def test_no_samples_and_nan_give_null():
     assert judged(np.full(T.size, np.nan), np.zeros(T.size)).result()["rmse_deg_s"] is None
 
 
+def test_lost_readings_are_left_out_and_counted(rng):
+    """The same as if the record had been taken at the other instants only; without gaps a NaN stays undefined."""
+    truth = tone(1.0, 10.0)
+    estimate = tone(1.02, 10.0, 0.1) + 0.01 * rng.standard_normal(T.size)
+    lost = rng.random(T.size) < 0.1
+    gappy = ErrorMetrics((10.0,), gaps=True)
+    gappy.add(T, np.where(lost, np.nan, estimate), truth)
+    result = gappy.result()
+    assert result.pop("missing") == np.count_nonzero(lost)
+    assert result == judged(estimate[~lost], truth[~lost], (10.0,), t=T[~lost]).result()
+    assert judged(np.where(lost, np.nan, estimate), truth).result()["rmse_deg_s"] is None
+
+
+def test_nothing_but_lost_readings_is_undefined():
+    gappy = ErrorMetrics((), gaps=True)
+    gappy.add(T, np.full(T.size, np.nan), np.zeros(T.size))
+    assert gappy.result()["rmse_deg_s"] is None
+    assert gappy.result()["missing"] == T.size
+
+
 def test_consistency_counts_errors_within_two_std(rng):
     error = rng.standard_normal(T.size)
     result = judged(error, np.zeros(T.size), std=np.ones(T.size)).consistency()

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from testbed.models.motions.sine import Sine
-from testbed.units import parse
+from testbed.parts import Part
+from testbed.units import Ratio, Temperature, parse
 
 DEG = math.pi / 180
 
@@ -31,6 +32,17 @@ DEG = math.pi / 180
         ("13.534 g/cm^3", "kg/m^3", 13534.0),
         ("-3 arcsec", "rad", -3 * DEG / 3600),
         ("500 µrad", "rad", 5e-4),
+        ("25 degC", "K", 298.15),
+        ("-40 degC", "K", 233.15),
+        ("298.15 K", "K", 298.15),
+        ("200 ppm", "", 2e-4),
+        ("1 %", "", 0.01),
+        ("0.3", "", 0.3),
+        ("10 ppm/K", "K^-1", 1e-5),
+        ("10 ppm/degC", "K^-1", 1e-5),
+        ("0.02 %/K", "K^-1", 2e-4),
+        ("0.005 deg/s/K", "rad/s/K", 0.005 * DEG),
+        ("0.01 deg/s/g0", "rad*s/m", 0.01 * DEG / 9.80665),
     ],
 )
 def test_parse_converts_to_si(text, si, value):
@@ -53,6 +65,10 @@ def test_parse_density_takes_the_cycle_as_a_number(text):
         ("1 deg", "rad/s"),
         ("5 s", "Hz"),
         ("1 deg/sqrt(h)", "rad/s"),
+        ("5 degC", ""),
+        ("1 %", "K"),
+        ("25 degC/s", "K"),
+        ("0.01 deg/s/g", "rad*s/m"),
     ],
 )
 def test_parse_refuses_another_dimension(text, si):
@@ -108,3 +124,36 @@ def test_quantity_refuses_what_is_no_finite_number(value):
 def test_quantity_bounds_are_checked_in_si():
     with pytest.raises(ValidationError, match=r"expected more than 0\.0 Hz"):
         Sine(frequency="-1 Hz", rate=0.1)
+
+
+class Thermal(Part):
+    """One absolute temperature and one ratio."""
+
+    temperature: Temperature
+    ratio: Ratio
+
+
+@pytest.mark.parametrize("text", ["25 degC", "-40 degC", "298.15 K", "20.1 degC"])
+@pytest.mark.parametrize("ratio", ["200 ppm", "0.02 %", 0.0002, "2e-4", -1, 0])
+def test_temperature_and_ratio_survive_the_round_trip(text, ratio):
+    part = Thermal.model_validate({"temperature": text, "ratio": ratio}, context={"border": True})
+    written = part.model_dump(mode="json", context={"border": True})
+    assert written["temperature"].endswith(" K")
+    assert Thermal.model_validate(written, context={"border": True}) == part
+
+
+def test_degrees_celsius_and_kelvin_are_the_same_bits():
+    assert parse("25 degC", "K") == 298.15
+    assert parse("-40 degC", "K") == 233.15
+
+
+@pytest.mark.parametrize("bad", [{"temperature": 25.0}, {"temperature": "0 K"}, {"temperature": "-300 degC"}])
+def test_temperature_refuses_no_unit_and_less_than_nothing(bad):
+    with pytest.raises(ValidationError, match="temperature"):
+        Thermal.model_validate({"ratio": 0.0, **bad}, context={"border": True})
+
+
+@pytest.mark.parametrize("bad", ["1 s", "much", True, math.nan, "inf", "nan %", None])
+def test_ratio_says_what_it_expects(bad):
+    with pytest.raises(ValidationError, match="expected a ratio, such as '200 ppm'"):
+        Thermal.model_validate({"temperature": "25 degC", "ratio": bad}, context={"border": True})

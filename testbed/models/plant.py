@@ -18,7 +18,7 @@ from testbed.errors import ScenarioError
 from testbed.models.servo import gains
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from testbed.models.turntable_parameters import Mounting, TurntableParameters
     from testbed.signals import FloatArray
@@ -36,7 +36,9 @@ _RUBBER = (0.16, 0.17, 0.18, 1.0)
 _MHD, _MEMS = (0.85, 0.45, 0.10, 1.0), (0.10, 0.45, 0.80, 1.0)
 
 
-def build(parameters: TurntableParameters, mountings: Mapping[str, Mounting], dt: float) -> Any:
+def build(
+    parameters: TurntableParameters, mountings: Mapping[str, Mounting], dt: float, exposed: Collection[str] = ()
+) -> Any:
     """Compile the model that the mode asks for.
 
     Parameters
@@ -47,12 +49,14 @@ def build(parameters: TurntableParameters, mountings: Mapping[str, Mounting], dt
         Sensor name to its place; each becomes a site and a visible geometry of that name.
     dt : float
         Integration step [s].
+    exposed : collection of str, optional
+        Sensors whose specific force is measured too.
 
     Returns
     -------
     mujoco.MjModel
         Sensors in this order: every joint position, spindle rate, motor torque, angular velocity (3) at `table_axis`
-        and at each mounting.
+        and at each mounting, specific force (3) at the exposed ones.
 
     Raises
     ------
@@ -71,6 +75,9 @@ def build(parameters: TurntableParameters, mountings: Mapping[str, Mounting], dt
     _add_sites(rotor, parameters, mountings)
     _add_motor(spec, parameters, servo=free)
     _add_sensors(spec, mountings)
+    for name in exposed:
+        kind, thing = mujoco.mjtSensor.mjSENS_ACCELEROMETER, mujoco.mjtObj.mjOBJ_SITE
+        spec.add_sensor(name=f"force_{name}", type=kind, objtype=thing, objname=name)
     try:
         return spec.compile()
     except ValueError as error:

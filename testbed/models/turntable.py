@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -15,7 +15,7 @@ from testbed.models.servo import required_torque
 from testbed.models.turntable_parameters import Cogging, Mounting, TurntableParameters
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from testbed.models.motion import CommandBlock
     from testbed.signals import FloatArray
@@ -45,6 +45,10 @@ class TruthBlock:
         Motor torque [N m].
     poses : dict of str to tuple of ndarray, shapes (n_pose, 3), (n_pose, 4)
         Body name to positions [m] and unit quaternions (w, x, y, z) at the samples with k % pose_stride == 0.
+    cross_rate : dict of str to ndarray, shape (n_time, 2)
+        Inertial rates about the housing's x and y axes [rad/s], of the exposed sensors.
+    specific_force : dict of str to ndarray, shape (n_time, 3)
+        Acceleration minus gravity at the mounting along the housing's axes [m/s^2], of the exposed sensors.
     """
 
     start: int
@@ -54,6 +58,8 @@ class TruthBlock:
     encoder_rate: FloatArray
     torque: FloatArray
     poses: Poses
+    cross_rate: dict[str, FloatArray] = field(default_factory=dict)
+    specific_force: dict[str, FloatArray] = field(default_factory=dict)
 
 
 class Turntable:
@@ -74,6 +80,8 @@ class Turntable:
         Integration steps per step of the base clock, with the same held commands.
     pose_stride : int, optional
         Steps between two poses.
+    exposed : collection of str, optional
+        Sensors whose cross rates and specific forces are wanted too.
 
     Raises
     ------
@@ -89,15 +97,16 @@ class Turntable:
         *,
         substeps: int = 1,
         pose_stride: int = 400,
+        exposed: Collection[str] = (),
     ) -> None:
         self.parameters = parameters
         self._dt = 1.0 / sample_rate_hz
         if parameters.mode == "servo":
             table_modes.check_modes(parameters, self._dt / substeps)
-        self.model = plant.build(parameters, mountings, self._dt / substeps)
+        self.model = plant.build(parameters, mountings, self._dt / substeps, exposed)
         self._data = mujoco.MjData(self.model)
         self._motor = int(self.model.actuator_ctrladr[self.model.actuator(plant.MOTOR).id])
-        self._names = tuple(mountings)
+        self._mountings, self._names, self._exposed = dict(mountings), tuple(mountings), tuple(exposed)
         self._substeps, self._stride = substeps, pose_stride
         self._next: int | None = None
         self._engine: Engine | None = None
@@ -144,6 +153,8 @@ class Turntable:
             encoder_rate=self._column("encoder_rate", rows),
             torque=self._column("torque", rows),
             poses=self._poses(command.start, angles),
+            cross_rate={name: self._columns(f"rate_{name}", rows)[:, :2] for name in self._exposed},
+            specific_force={name: self._columns(f"force_{name}", rows) for name in self._exposed},
         )
 
     def _fixed(self, command: CommandBlock) -> TruthBlock:
@@ -151,6 +162,7 @@ class Turntable:
         # A rate about the vertical, seen along a tilted axis: the last element of the site's rotation.
         projection = {name: float(plant.rotation(self.model.site(name).quat)[2, 2]) for name in self._names}
         sensor_rate = {name: factor * rate for name, factor in projection.items()}
+        surroundings = {name: self._fixed_surroundings(name, command) for name in self._exposed}
         return TruthBlock(
             start=command.start,
             rate=rate,
@@ -159,7 +171,22 @@ class Turntable:
             encoder_rate=rate.copy(),
             torque=np.zeros(command.n_time),
             poses=self._poses(command.start, angle[:, None]),
+            cross_rate={name: cross for name, (cross, _) in surroundings.items()},
+            specific_force={name: force for name, (_, force) in surroundings.items()},
         )
+
+    def _fixed_surroundings(self, name: str, command: CommandBlock) -> tuple[FloatArray, FloatArray]:
+        """Return cross rates and specific force of a mounting that turns about the vertical and does nothing else."""
+        x, y, _ = self._mountings[name].position
+        rate, acceleration = command.rate[:-1], np.diff(command.rate) / self._dt
+        force = [
+            -acceleration * y - rate**2 * x,
+            acceleration * x - rate**2 * y,
+            np.full(rate.size, self.parameters.gravity),
+        ]
+        to_table = plant.rotation(self.model.site(name).quat)
+        turned: FloatArray = (to_table.T[:, :, None] * np.array(force)).sum(axis=1).T
+        return rate[:, None] * to_table[2, :2], turned
 
     def _start(self, command: CommandBlock) -> Engine:
         data, parameters = mujoco.MjData(self.model), self.parameters
@@ -188,6 +215,11 @@ class Turntable:
         """Return the last component of a sensor: the value of a scalar, the z of an angular velocity."""
         entry = self.model.sensor(sensor)
         return rows[:, entry.adr[0] + entry.dim[0] - 1].copy()
+
+    def _columns(self, sensor: str, rows: FloatArray) -> FloatArray:
+        """Return all components of a sensor, shape (n_time, n_component)."""
+        entry = self.model.sensor(sensor)
+        return rows[:, entry.adr[0] : entry.adr[0] + entry.dim[0]].copy()
 
     def _poses(self, start: int, qpos: FloatArray) -> Poses:
         """Return where the bodies are at the pose samples, from joint positions, shape (n_time, nq)."""

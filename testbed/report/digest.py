@@ -19,6 +19,8 @@ BLOCK = 2**18
 N_BINS = 700
 # A constant error leaks into the first two bins of a Hann window; from the third on the spectrum is free of it.
 FIRST_FREQ = 2
+# Lost readings in a row that a straight line may stand for.
+LONGEST_BRIDGE = 10
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def _follow(
         _add_rate(trace, first, rate)
         whole.process(first, error)
         if welch is not None:
-            welch.process(error[settled:])
+            welch.process(_bridged(error[settled:]) if std is None else error[settled:])
         if std is not None:
             sigma = std.read(first, stop)
             band.process(first, sigma)
@@ -156,6 +158,18 @@ def _follow(
         density=density,
         n_segments=0 if welch is None else welch.n_segments,
     )
+
+
+def _bridged(error: FloatArray) -> FloatArray:
+    """Put straight lines across a sensor's lost readings, unless many are lost in a row: a gap leaves no spectrum."""
+    there = np.flatnonzero(np.isfinite(error))
+    if not 0 < there.size < error.size:
+        return error
+    bridged = np.interp(np.arange(error.size), there, error[there])
+    edges = np.concatenate([[-1], there, [error.size]])
+    for i in np.flatnonzero(np.diff(edges) > LONGEST_BRIDGE + 1):
+        bridged[edges[i] + 1 : edges[i + 1]] = np.nan
+    return bridged
 
 
 def _count_inside(error: FloatArray, sigma: FloatArray) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
@@ -24,6 +25,40 @@ class SensorStage(Protocol):
         """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
 
 
+@dataclass(frozen=True)
+class Surroundings:
+    """What reaches an instrument over a block besides the rate about its axis; None: level, still, at its reference.
+
+    Parameters
+    ----------
+    cross_rate : ndarray, shape (n_time, 2), optional
+        True inertial rates about the housing's x and y axes, the sensing axis being z [rad/s].
+    specific_force : ndarray, shape (n_time, 3), optional
+        Acceleration minus gravity at the mounting, along the housing's axes [m/s^2].
+    temperature : ndarray, shape (n_time,), optional
+        Temperature of the instrument [K].
+    """
+
+    cross_rate: FloatArray | None = None
+    specific_force: FloatArray | None = None
+    temperature: FloatArray | None = None
+
+    def part(self, start: int, stop: int) -> Surroundings:
+        """Return the samples from `start` to before `stop`."""
+        rows = slice(start, stop)
+        return Surroundings(
+            *(None if x is None else x[rows] for x in (self.cross_rate, self.specific_force, self.temperature))
+        )
+
+
+@runtime_checkable
+class ExposedStage(SensorStage, Protocol):
+    """An instrument whose readings depend on its surroundings too, such as the temperature."""
+
+    def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
+
+
 @runtime_checkable
 class ProfiledStage(SensorStage, Protocol):
     """An instrument with a fluid inside, whose velocity profile can be looked at."""
@@ -42,7 +77,8 @@ class Sensor(Part):
     sample_rate : float
         Rate of the readings [Hz]; reading j is at t = j / sample_rate.
     noise : bool
-        Off: no noise terms and no rounding, so that a run can be exact; the dynamics and the range stay.
+        Off: nothing random and no rounding, so that a run can be exact; the dynamics, the constant errors and the
+        range stay.
     mounting : Mounting
         Where it sits on the table and how far its axis is off.
     """
@@ -65,6 +101,15 @@ class Sensor(Part):
         ndarray of complex, shape (n_freq,)
             Response [-].
         """
+
+    @property
+    def exposed(self) -> bool:
+        """Whether the readings depend on cross rates or accelerations, which the plant works out for those alone."""
+        return False
+
+    def datasheet(self) -> list[tuple[str, str]]:
+        """Return what the parameters mean in data-sheet units: rows of a quantity and its value."""
+        return []
 
     @abstractmethod
     def full_scale(self) -> float:

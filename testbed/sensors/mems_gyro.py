@@ -1,4 +1,4 @@
-"""The MEMS gyro: input-referred noise, low-pass, reading clock, word."""
+"""The MEMS gyro: constant errors, input-referred noise, low-pass, decimation, reading clock, word, lost readings."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
+from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
-from testbed.signals import LinearFilter, transfer
+from testbed.signals import LinearFilter, random_stream, transfer
 from testbed.units import Frequency, Quantity, Range
 
 if TYPE_CHECKING:
@@ -27,11 +28,12 @@ WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", 
 Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
 
 
-class MemsGyro(Sensor, GyroTerms):
+class MemsGyro(GyroErrors, Sensor, GyroTerms):
     """A MEMS gyro as its user sees it: readings in rad/s.
 
-    The noise is added to the rate and passes the low-pass with it, as in the real chip. The low-pass is given either
-    by its coefficients or as a second order with `corner` and `damping`.
+    One chain: true rate, constant errors, noise, low-pass, decimation filter, reading clock, dead band, range and word,
+    lost readings. The noise is added to the rate and passes the low-pass with it, as in the real chip. The low-pass is
+    given either by its coefficients or as a second order with `corner` and `damping`.
 
     Parameters
     ----------
@@ -72,6 +74,13 @@ class MemsGyro(Sensor, GyroTerms):
             raise ValueError(msg)
         return self
 
+    @model_validator(mode="after")
+    def _young_enough(self) -> Self:
+        if self.jitter > 1.0 / self.sample_rate:
+            msg = f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, got {self.jitter!r} s"
+            raise ValueError(msg)
+        return self
+
     @property
     def transfer_function(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Numerator and denominator of the low-pass in s [rad/s], highest power first."""
@@ -81,7 +90,9 @@ class MemsGyro(Sensor, GyroTerms):
         return (natural**2,), (1.0, 2.0 * self.damping * natural, natural**2)
 
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Return indicated over true rate, the low-pass alone.
+        """Return indicated over true rate at the reference temperature: scale factor, low-pass, decimation, mean age.
+
+        Asymmetry and dead band, which are not linear, are left out.
 
         Parameters
         ----------
@@ -93,8 +104,11 @@ class MemsGyro(Sensor, GyroTerms):
         ndarray of complex, shape (n_freq,)
             Response [-].
         """
+        freq = np.asarray(freq_hz, dtype=np.float64)
         numerator, denominator = self.transfer_function
-        return transfer(np.array(numerator), np.array(denominator), np.asarray(freq_hz, dtype=np.float64))
+        low_pass = transfer(np.array(numerator), np.array(denominator), freq)
+        clock = self.clock_response(freq, self.sample_rate, _INPUT_RATE_HZ)
+        return (1.0 + self.scale_factor_error) * low_pass * clock
 
     def full_scale(self) -> float:
         """Return the largest rate that it can read [rad/s]."""
@@ -103,8 +117,29 @@ class MemsGyro(Sensor, GyroTerms):
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate, its terms at 20 kHz; see `Sensor.input_noise_psd`."""
         rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
-        density: FloatArray = self.noise_psd(freq_hz, _INPUT_RATE_HZ) + rounding / np.abs(self.response(freq_hz)) ** 2
+        terms = self.noise_psd(freq_hz, _INPUT_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
+        density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
+
+    def datasheet(self) -> list[tuple[str, str]]:
+        """Return the noise in data-sheet units and what it comes to; see `Sensor.datasheet`."""
+        density, hour = np.rad2deg(self.angle_random_walk), np.rad2deg(3600.0)
+        floor = (2.0 * np.log(2.0) / np.pi) ** 0.5
+        allan = {tau: hour * self.allan_variance(tau) ** 0.5 for tau in (1.0, 100.0)}
+        delay = self.delay(self.sample_rate, _INPUT_RATE_HZ)
+        return [
+            ("angle random walk N", f"{60.0 * density:.6g} deg/sqrt(h)"),
+            ("N as root density, two-sided", f"{density:.6g} deg/s/sqrt(Hz)"),
+            ("N as root density, one-sided (vendors)", f"{2.0**0.5 * density:.6g} deg/s/sqrt(Hz)"),
+            ("bias instability B", f"{hour * self.bias_instability:.6g} deg/h"),
+            ("its Allan floor, 0.664 B", f"{hour * floor * self.bias_instability:.6g} deg/h"),
+            ("rate random walk K", f"{60.0 * hour * self.rate_random_walk:.6g} deg/h/sqrt(h)"),
+            ("quantisation Q", f"{1e6 * self.quantization:.6g} urad"),
+            ("Markov bias, correlation time", f"{hour * self.markov_bias:.6g} deg/h, {self.markov_time:g} s"),
+            ("one count of the word", f"{np.rad2deg(1.0 / self.sensitivity):.6g} deg/s"),
+            *((f"Allan deviation at {tau:g} s, before the low-pass", f"{allan[tau]:.6g} deg/h") for tau in allan),
+            ("delay by decimation and age", f"{1e3 * delay:.6g} ms"),
+        ]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MemsGyroStage:
         """Return the gyro at rest; see `Sensor.start`."""
@@ -115,13 +150,38 @@ class MemsGyroStage:
     """A MEMS gyro in time; made by `MemsGyro.start`."""
 
     def __init__(self, gyro: MemsGyro, input_rate_hz: float, seed: int, name: str) -> None:
-        self._decimator = Decimator(rate_ratio(input_rate_hz, gyro.sample_rate))
+        ratio = rate_ratio(input_rate_hz, gyro.sample_rate)
+        if isinstance(gyro.fir, tuple) and input_rate_hz != _INPUT_RATE_HZ:
+            msg = (
+                f"input_rate_hz: expected {_INPUT_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
+            )
+            raise ValueError(msg)
+        self._gyro = gyro
+
+        def stream(term: str) -> np.random.Generator:
+            return random_stream(seed, name, term)
+
+        self._turn_on = gyro.turn_on_bias * stream("turn_on_bias").standard_normal() if gyro.noise else 0.0
         self._noise = NoiseStage(gyro.noise_terms(input_rate_hz, seed, name) if gyro.noise else {})
         numerator, denominator = gyro.transfer_function
         self._low_pass = LinearFilter(list(numerator), list(denominator), input_rate_hz)
+        self._fir = Fir(gyro.weights(ratio))
+        self._decimator: Decimator | AgedSampler = Decimator(ratio)
+        if gyro.jitter:
+            self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
         self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.range, rounding=gyro.noise)
+        self._losses = stream("dropped")
 
     def process(self, true_rate: FloatArray) -> FloatArray:
-        """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        sensed = self._low_pass.process(true_rate + self._noise.process(true_rate.size))
-        return self._converter.process(self._decimator.process(sensed))
+        """Return the readings [rad/s] that fall into a block of the true rate [rad/s], level, still and at T_0."""
+        return self.process_in(true_rate, Surroundings())
+
+    def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return the readings [rad/s] that fall into a block of the true rate [rad/s]; NaN where one is lost."""
+        sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
+        filtered = self._low_pass.process(sensed + self._noise.process(true_rate.size))
+        taken = self._decimator.process(self._fir.process(filtered))
+        readings = self._converter.process(np.where(np.abs(taken) < self._gyro.dead_band, 0.0, taken))
+        if self._gyro.noise and self._gyro.dropped:
+            readings[self._losses.random(readings.size) < self._gyro.dropped] = np.nan
+        return readings

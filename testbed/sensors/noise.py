@@ -85,6 +85,38 @@ class GyroTerms(Part):
         )
         return density
 
+    def allan_variance(self, tau: float) -> float:
+        r"""Return the expected Allan variance of the sum of the terms, the ramp included.
+
+        .. math:: \frac{3 Q^2}{\tau^2} + \frac{N^2}{\tau} + \frac{2 \ln 2}{\pi} B^2 + \frac{K^2 \tau}{3}
+            + \frac{R^2 \tau^2}{2} + \frac{2 \sigma_b^2 T_c}{\tau}
+            \left[1 - \frac{T_c}{2 \tau} (3 - 4 e^{-\tau/T_c} + e^{-2 \tau/T_c})\right]
+
+        Parameters
+        ----------
+        tau : float
+            Averaging time, well inside the flicker's band [s].
+
+        Returns
+        -------
+        float
+            Variance [rad^2/s^2].
+
+        References
+        ----------
+        IEEE Std 952-1997, annex C.
+        """
+        x = tau / self.markov_time
+        lag = 1.0 + (4.0 * math.expm1(-x) - math.expm1(-2.0 * x)) / (2.0 * x)
+        return (
+            3.0 * self.quantization**2 / tau**2
+            + self.angle_random_walk**2 / tau
+            + 2.0 * math.log(2.0) / math.pi * self.bias_instability**2
+            + self.rate_random_walk**2 * tau / 3.0
+            + self.rate_ramp**2 * tau**2 / 2.0
+            + 2.0 * self.markov_bias**2 / x * lag
+        )
+
     def noise_terms(self, sample_rate_hz: float, seed: int, *names: str) -> dict[str, NoiseTerm]:
         """Return the terms that are not zero, each on the stream ``(*names, term)`` of `seed`.
 

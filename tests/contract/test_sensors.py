@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import typing
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydantic import BaseModel
 
 from testbed.parts import preset, preset_names, resolve
 from testbed.sensors import SENSORS, load_preset
-from testbed.sensors.base import Sensor
+from testbed.sensors.base import ExposedStage, Sensor, Surroundings
+from testbed.units import Quantity
 
 PRESETS = preset_names("testbed.sensors")
 FS = 20_000.0
@@ -103,3 +106,117 @@ def test_preset_survives_the_round_trip_through_its_resolved_form(name):
     sensor = load_preset(name)
     written = sensor.model_dump(mode="json", context={"border": True}, exclude_none=True)
     assert type(sensor).model_validate(written, context={"border": True}) == sensor
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_datasheet_is_rows_of_text(name):
+    rows = load_preset(name).datasheet()
+    assert all(isinstance(text, str) and text for row in rows for text in row)
+    assert len(dict(rows)) == len(rows)
+
+
+# What a key needs beside it to mean something, by sensor type.
+COMPANIONS = {
+    "markov_time": {"markov_bias": 1e-3},
+    "lowest_frequency": {"bias_instability": 1e-3, "noise_knee": 1.0},
+    "damping": {"corner": 50.0, "numerator": None, "denominator": None},
+    "corner": {"corner": 50.0, "numerator": None, "denominator": None},
+    "numerator": {"corner": None, "numerator": (1.0,), "denominator": (0.01, 1.0)},
+    "denominator": {"corner": None, "numerator": (1.0,), "denominator": (0.01, 1.0)},
+    "reference_temperature": {"bias_temperature": 1e-3},
+    "load_fraction": {"closure": "radial_field"},
+}
+# Keys whose changed value is no neighbour of the old one.
+VALUES = {
+    "numerator": (0.9,),
+    "denominator": (0.02, 1.0),
+    "corner": 77.0,
+    "fir": "average",
+    "noise": False,
+    "channel.fluid": "galinstan",
+    # Short-circuited, `axial_field` is `local`.
+    "channel.closure": "radial_field",
+    "channel.load_fraction": 0.5,
+    "channel.nodes": 40,
+    "jitter": 1e-4,
+    # Beyond the count of a 16-bit word within the record.
+    "rate_random_walk": 1e-3,
+    # So that the signal below, up to 0.02 rad/s, reaches them.
+    "range": 0.01,
+    "adc_range": 0.5,
+    "word_bits": 8,
+    "adc_bits": 12,
+    "sample_rate": 1000.0,
+    "dead_band": 0.005,
+    "dropped": 0.2,
+}
+
+
+def changed(field, value):
+    """Return a value of a field that is another one: its half if it has a size, or else the example of its unit."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return value + 1
+    if isinstance(value, float) and value:
+        return 0.5 * value
+    if isinstance(value, tuple):
+        return tuple(changed(None, v) if v else 1e-3 for v in value)
+    quantities = [m for m in (field.metadata if field else []) if isinstance(m, Quantity)]
+    quantities += (
+        [m for a in typing.get_args(field.annotation) for m in getattr(a, "__metadata__", ())] if field else []
+    )
+    return next(m.example for m in quantities if isinstance(m, Quantity))
+
+
+def keys(part, prefix=""):
+    """Yield the dotted names of all fields of a parameter set, nested ones too."""
+    for name in type(part).model_fields:
+        value = getattr(part, name)
+        if isinstance(value, BaseModel) and name not in {"mounting", "fluid"}:
+            yield from keys(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+def with_change(sensor, key, *, change):
+    """Return the sensor with the companions of `key`, and the key itself changed or not."""
+    *parents, name = key.split(".")
+    part = sensor
+    for parent in parents:
+        part = getattr(part, parent)
+    values = {k: v for k, v in COMPANIONS.get(name, {}).items() if k in type(part).model_fields}
+    if change:
+        values[name] = VALUES[key] if key in VALUES else changed(type(part).model_fields[name], getattr(part, name))
+    part = type(part).model_validate({**part.model_dump(), **values})
+    for parent in reversed(parents):
+        part = type(sensor).model_validate({**sensor.model_dump(), parent: part.model_dump()})
+    return part
+
+
+def output(sensor):
+    """Return readings in rich surroundings, and the response."""
+    rate = np.abs(record())
+    around = Surroundings(np.outer(rate, [1, -2]), np.outer(1 + rate, [1, 2, 3]), 310.0 + 100 * rate)
+    stage = sensor.start(FS, 1, "sensor")
+    readings = stage.process_in(rate, around) if isinstance(stage, ExposedStage) else stage.process(rate)
+    return readings, sensor.response(np.array([1.0, 100.0]))
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [(name, key) for name in PRESETS for key in keys(load_preset(name)) if key != "mounting"]
+)
+def test_every_key_changes_the_output(name, key):
+    """No key is silently ignored: each changes readings or response of each preset (where it sits: see the plant's tests)."""
+    sensor = load_preset(name)
+    before, after = (output(with_change(sensor, key, change=change)) for change in (False, True))
+    same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, after, strict=True))
+    assert not same
+
+
+def test_the_check_of_keys_sees_an_ignored_one(monkeypatch):
+    from testbed.sensors.gyro_errors import GyroErrors
+
+    monkeypatch.setattr(GyroErrors, "distort", lambda self, rate, around, turn_on: rate)
+    with pytest.raises(AssertionError):
+        test_every_key_changes_the_output("crs03", "g_sensitivity")
