@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from testbed.sensors import load_preset
-from testbed.sensors.mhd_ars import MhdArs, OnePole
+from testbed.sensors.analogue import OnePole
+from testbed.sensors.mhd_ars import MhdArs
 from testbed.signals import transfer
 
 
