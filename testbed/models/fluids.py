@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from testbed.errors import UnknownNameError
-from testbed.models.temperature import TemperatureCoefficient, drift
+from testbed.models.thermal_drift import TemperatureCoefficient, drift
 from testbed.parts import Part
 from testbed.units import Conductivity, MassDensity, Viscosity
 

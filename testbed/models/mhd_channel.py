@@ -25,7 +25,7 @@ from pydantic import Field, field_validator
 from testbed.models.channel_modes import ChannelModes, ChannelStage, channel_modes
 from testbed.models.chebyshev import chebyshev_points
 from testbed.models.fluids import FLUIDS, Fluid, NamedFluid
-from testbed.models.temperature import TemperatureCoefficient, drift
+from testbed.models.thermal_drift import TemperatureCoefficient, drift
 from testbed.parts import Part
 from testbed.units import Length, MagneticField
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from testbed.models.channel_ring import ChannelRing
 from testbed.models.mhd_channel import MhdChannel
-from testbed.models.temperature import REFERENCE, Temperature
+from testbed.models.thermal_drift import REFERENCE, Temperature
 from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer

@@ -37,7 +37,7 @@ def test_resistance_is_length_over_cross_section() -> None:
 
 @pytest.mark.oracle
 def test_johnson_noise_is_nyquists() -> None:
-    assert BOLTZMANN == Boltzmann
+    assert Boltzmann == BOLTZMANN
     it = channel("axial_field")
     # One-sided 4 k T R; scaled from the textbook's 4.07 nV/sqrt(Hz) of 1 kohm at 300 K.
     one_sided = 4.07e-9 * np.sqrt(RING.resistance(it) / 1e3)

@@ -15,7 +15,7 @@ from testbed.models import channel_modes as modes_module
 from testbed.models.chebyshev import clenshaw_curtis, even_operators
 from testbed.models.fluids import FLUIDS
 from testbed.models.mhd_channel import Fluid, MhdChannel, one_mode_response
-from testbed.models.temperature import REFERENCE
+from testbed.models.thermal_drift import REFERENCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from testbed.models.fluids import FLUIDS, Fluid
 from testbed.models.mhd_channel import MhdChannel
-from testbed.models.temperature import REFERENCE, Temperature, drift
+from testbed.models.thermal_drift import REFERENCE, Temperature, drift
 
 BORDER = {"border": True}
 
