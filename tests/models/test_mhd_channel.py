@@ -311,7 +311,7 @@ def test_simulation_agrees_with_an_independent_integrator(closure: str, load: fl
     # The judge converges with the order of its scheme, two, so the fine grid is off by a third of the step and what is
     # extrapolated from it by one order more; our hold adds (T/width)^2/6 = 4e-6.
     assert np.log2(np.max(np.abs(middle - coarse)) / step) == pytest.approx(2.0, abs=0.2)
-    assert step < 2e-3
+    assert step < 2e-4
     assert np.max(np.abs(ours - (fine + (fine - middle) / 3))) < step / 20 + 4e-6
 
 
