@@ -44,7 +44,8 @@ def schema() -> dict[str, Any]:
 
     def part(model: type[Any]) -> dict[str, Any]:
         raw: dict[str, Any] = model.model_json_schema(ref_template="#/$defs/{model}")
-        definitions.update(raw.pop("$defs", {}))
+        # A preset may supply the keys of nested parts too, such as the channel of an MHD ARS.
+        definitions.update({name: _optional(nested) for name, nested in raw.pop("$defs", {}).items()})
         return raw
 
     frame = part(Frame)

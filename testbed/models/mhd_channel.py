@@ -25,6 +25,7 @@ from pydantic import Field, field_validator
 from testbed.models.channel_modes import ChannelModes, ChannelStage, channel_modes
 from testbed.models.chebyshev import chebyshev_points
 from testbed.models.fluids import FLUIDS, Fluid, NamedFluid
+from testbed.models.thermal_drift import TemperatureCoefficient, drift
 from testbed.parts import Part
 from testbed.units import Length, MagneticField
 
@@ -57,7 +58,9 @@ class MhdChannel(Part):
     height : float
         l [m].
     field : float
-        Magnetic flux density B [T].
+        Magnetic flux density B at 20 degC [T].
+    field_drift : float
+        Relative change of B per kelvin at 20 degC, that of the magnet's remanence [1/K].
     closure : {"local", "radial_field", "axial_field"}
         How the current closes; see the module's table.
     load_fraction : float
@@ -73,6 +76,7 @@ class MhdChannel(Part):
     fluid: NamedFluid
     height: Length
     field: MagneticField
+    field_drift: TemperatureCoefficient = 0.0
     closure: Literal["local", "radial_field", "axial_field"] = "local"
     load_fraction: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     nodes: Annotated[int, Field(strict=True)] = 160
@@ -92,6 +96,11 @@ class MhdChannel(Part):
             msg = f"expected an even number from {MIN_NODES} to {MAX_NODES}, got {value}"
             raise ValueError(msg)
         return value
+
+    def at(self, temperature: float) -> MhdChannel:
+        """Return the channel as it is at `temperature` [K], of constant properties; walls do not expand."""
+        field = self.field * drift(self.field_drift, temperature)
+        return self.model_copy(update={"fluid": self.fluid.at(temperature), "field": field, "field_drift": 0.0})
 
     @property
     def braking_rate(self) -> float:

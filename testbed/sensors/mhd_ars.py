@@ -1,4 +1,4 @@
-"""The MHD angular rate sensor: fluid channel, amplifier, electronic noise, converter."""
+"""The MHD angular rate sensor: fluid channel, transformer, amplifier, filter, delay, electronic noise, converter."""
 
 from __future__ import annotations
 
@@ -6,31 +6,57 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy.signal import lfilter
 
+from testbed.models.channel_ring import ChannelRing
 from testbed.models.mhd_channel import MhdChannel
+from testbed.models.thermal_drift import REFERENCE, Temperature
+from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
+from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
-from testbed.sensors.noise_terms import NoiseStage
-from testbed.units import Frequency, ScaleFactor, Voltage
+from testbed.sensors.noise_terms import NoiseStage, White
+from testbed.signals import random_stream
+from testbed.units import Duration, Frequency, ScaleFactor, Voltage
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from testbed.sensors.analogue import AnalogueStage
+    from testbed.sensors.noise_terms import NoiseTerm
     from testbed.signals import ComplexArray, FloatArray
 
 
 class MhdArs(Sensor, ElectronicTerms):
     """An MHD angular rate sensor as its user sees it: readings in rad/s, after the calibrated scale factor.
 
+    The signal passes channel, transformer, amplifier, its rails, anti-alias filter and delay, is sampled, receives the
+    electronic noise and is converted. What is left out is not there.
+
     Parameters
     ----------
     channel : MhdChannel
-        The fluid between its walls.
+        The fluid between its walls, at 20 degC.
+    temperature : float
+        Of fluid and magnet, constant [K]. The calibration is that of 20 degC, so the magnet's drift shows in the
+        readings.
+    ring : ChannelRing, optional
+        The channel's other dimensions; given, the Johnson noise of its resistance is added.
     gain : float
         Calibrated scale factor over the bare channel's, set so that the pass band reads true [-].
+    scale_factor_error : float
+        Relative error of that calibration [-].
+    transformer : Transformer, optional
+        High-pass between electrodes and amplifier.
     amplifier_pole : float
         Corner of the first-order amplifier [Hz].
+    second_pole : float, optional
+        A further pole of the amplifier [Hz].
+    saturation : Saturation, optional
+        The amplifier's rails and its recovery from them.
+    anti_alias : LowPass, optional
+        Butterworth filter in front of the converter.
+    delay : float
+        Dead time of everything behind the channel [s].
     scale_factor : float
         Output voltage per rate [V s/rad].
     adc_range : float
@@ -40,8 +66,16 @@ class MhdArs(Sensor, ElectronicTerms):
     """
 
     channel: MhdChannel
+    temperature: Temperature = REFERENCE
+    ring: ChannelRing | None = None
     gain: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
+    scale_factor_error: Annotated[float, Field(gt=-1.0, lt=1.0, allow_inf_nan=False)] = 0.0
+    transformer: Transformer | None = None
     amplifier_pole: Frequency
+    second_pole: Frequency | None = None
+    saturation: Saturation | None = None
+    anti_alias: LowPass | None = None
+    delay: Duration = 0.0
     scale_factor: ScaleFactor
     adc_range: Voltage = 10.0
     adc_bits: Annotated[int, Field(strict=True, ge=2, le=32)] = 18
@@ -51,18 +85,40 @@ class MhdArs(Sensor, ElectronicTerms):
         """One count of the converter [rad/s]."""
         return float(2.0 * self.adc_range / 2**self.adc_bits / self.scale_factor)
 
+    @property
+    def warm_channel(self) -> MhdChannel:
+        """The channel at the sensor's temperature."""
+        return self.channel.at(self.temperature)
+
+    @property
+    def channel_gain(self) -> float:
+        """Reading per slip in the pass band: calibration, its error, and what the magnet has lost since [-]."""
+        magnet = self.warm_channel.field / self.channel.field if self.channel.field else 1.0
+        return self.gain * (1.0 + self.scale_factor_error) * magnet
+
+    @property
+    def johnson_noise(self) -> float:
+        """Two-sided root density of the channel's Johnson noise, as a slip rate [rad/s/sqrt(Hz)]; 0 without `ring`."""
+        if self.ring is None or not self.channel.field:
+            return 0.0
+        channel = self.warm_channel
+        return self.ring.voltage_noise(channel, self.temperature) / self.ring.emf_per_rate(channel)
+
     def full_scale(self) -> float:
-        """Return the largest rate that the converter can read [rad/s]."""
-        return self.adc_range / self.scale_factor
+        """Return the largest rate that converter and amplifier can read [rad/s]."""
+        rails = self.saturation.limit if self.saturation else self.adc_range
+        return min(self.adc_range, rails) / self.scale_factor
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate; see `Sensor.input_noise_psd`."""
         output = self.noise_psd(freq_hz) + rounding_psd(self.resolution, self.sample_rate)
         density: FloatArray = output / np.abs(self.response(freq_hz)) ** 2
+        if self.ring is not None:
+            density += self.johnson_noise**2 / np.abs(self.warm_channel.response(freq_hz)) ** 2
         return density
 
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Return indicated over true rate: channel (Su et al. 2024, equation (2)), gain, amplifier.
+        """Return indicated over true rate: channel (Su et al. 2024, equation (2)) and electronics, rails aside.
 
         Parameters
         ----------
@@ -80,8 +136,22 @@ class MhdArs(Sensor, ElectronicTerms):
             If a frequency is not finite.
         """
         freq = np.asarray(freq_hz, dtype=np.float64)
-        response: ComplexArray = self.gain * self.channel.response(freq) / (1.0 + 1j * freq / self.amplifier_pole)
+        response: ComplexArray = (
+            self.channel_gain * self.warm_channel.response(freq) / (1.0 + 1j * freq / self.amplifier_pole)
+        )
+        for block in (*self.before_rails(), *self.behind_rails()):
+            response = response * block.response(freq)
         return response
+
+    def before_rails(self) -> list[Linear]:
+        """Return the optional linear blocks before the amplifier's rails."""
+        second = LowPass(corner=self.second_pole) if self.second_pole is not None else None
+        return [block for block in (self.transformer, second) if block is not None]
+
+    def behind_rails(self) -> list[Linear]:
+        """Return the optional linear blocks behind them."""
+        delay = Delay(time=self.delay) if self.delay else None
+        return [block for block in (self.anti_alias, delay) if block is not None]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MhdArsStage:
         """Return the sensor at rest; see `Sensor.start`."""
@@ -93,17 +163,23 @@ class MhdArsStage:
 
     def __init__(self, sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> None:
         self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
-        self._channel = sensor.channel.start(input_rate_hz)
+        self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
-        self._amplifier = OnePole(sensor.amplifier_pole, input_rate_hz)
-        self._gain = sensor.gain
+        self._johnson = NoiseStage(_johnson_terms(sensor, input_rate_hz, seed, name))
+        self._gain = sensor.channel_gain
+        self._analogue = _analogue_chain(sensor, input_rate_hz)
         self._noise = NoiseStage(sensor.noise_terms(sensor.sample_rate, seed, name) if sensor.noise else {})
-        self._converter = Converter(sensor.resolution, sensor.adc_bits, sensor.full_scale(), rounding=sensor.noise)
+        self._converter = Converter(
+            sensor.resolution, sensor.adc_bits, sensor.adc_range / sensor.scale_factor, rounding=sensor.noise
+        )
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        analogue = self._amplifier.process(self._gain * self._channel.process(true_rate))
-        taken = self._decimator.process(analogue)
+        slip = self._channel.process(true_rate)
+        signal = self._gain * (slip + self._johnson.process(slip.size))
+        for stage in self._analogue:
+            signal = stage.process(signal)
+        taken = self._decimator.process(signal)
         return self._converter.process(taken + self._noise.process(taken.size))
 
     def profile(self) -> FloatArray:
@@ -111,39 +187,16 @@ class MhdArsStage:
         return self._channel.profile()
 
 
-class OnePole:
-    r"""A first-order low-pass, exact for an input that is a cubic through the last four samples.
+def _johnson_terms(sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> dict[str, NoiseTerm]:
+    density = sensor.johnson_noise if sensor.noise else 0.0
+    return {"johnson": White(density, input_rate_hz, random_stream(seed, name, "johnson"))} if density else {}
 
-    .. math:: y_k = p y_{k-1} + \sum_{j=0}^{3} c_j u_{k-j}, \quad p = e^{-h}, \quad h = 2 \pi f_p T
 
-    The c_j match the response to third order in s: within 1e-3 at 1/20 of the sample rate, where a
-    straight line between samples would lose 0.8 %.
-
-    Parameters
-    ----------
-    pole_hz : float
-        Corner [Hz].
-    sample_rate_hz : float
-        Rate of the samples [Hz].
-    """
-
-    def __init__(self, pole_hz: float, sample_rate_hz: float) -> None:
-        h = 2.0 * np.pi * pole_hz / sample_rate_hz
-        order = np.arange(4)
-        factorial = np.array([1.0, 1.0, 2.0, 6.0])
-        # Taylor coefficients in sT of (1 - p exp(-sT)) / (1 + sT / h) and of exp(-j sT).
-        numerator = -np.exp(-h) * (-1.0) ** order / factorial
-        numerator[0] += 1.0
-        wanted = np.convolve(numerator, (-1.0 / h) ** order)[:4]
-        delays = (-1.0) ** order[:, None] * order[None, :] ** order[:, None] / factorial[:, None]
-        self._b = np.linalg.solve(delays, wanted)
-        self._a = np.array([1.0, -np.exp(-h)])
-        self._state = np.zeros(3)
-
-    def process(self, u: FloatArray) -> FloatArray:
-        """Return the filtered samples, shape (n_time,), unit of `u`; at rest before the first."""
-        if not u.size:
-            return np.empty(0)
-        y: FloatArray
-        y, self._state = lfilter(self._b, self._a, u, zi=self._state)
-        return y
+def _analogue_chain(sensor: MhdArs, input_rate_hz: float) -> list[AnalogueStage]:
+    chain: list[AnalogueStage] = [OnePole(sensor.amplifier_pole, input_rate_hz)]
+    chain += [block.start(input_rate_hz) for block in sensor.before_rails()]
+    if sensor.saturation is not None:
+        limit = sensor.saturation.limit / sensor.scale_factor
+        chain.append(SaturationStage(limit, sensor.saturation.recovery_time, input_rate_hz))
+    chain += [block.start(input_rate_hz) for block in sensor.behind_rails()]
+    return chain
