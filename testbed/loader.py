@@ -73,6 +73,8 @@ class _Reader:
         turntable = self._turntable(parts["turntable"])
         motion = self._motion(parts["motion"])
         sensors, types = self._sensors(parts["sensors"])
+        if frame is not None and "temperature" in frame.model_fields_set:
+            sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
         fusion = self._fusion(parts["fusion"], types)
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
@@ -221,6 +223,13 @@ class _Reader:
             return True
         self._doc.find(key, f"expected a name of letters, digits and underscores, got {name!r}")
         return False
+
+
+def at_temperature(sensor: Sensor, temperature: float) -> Sensor:
+    """Return a sensor at the run's temperature [K], if it has a constant one and its entry names none."""
+    if "temperature" not in type(sensor).model_fields or "temperature" in sensor.model_fields_set:
+        return sensor
+    return sensor.model_copy(update={"temperature": temperature})
 
 
 def _relation(match: re.Match[str] | None) -> tuple[str, float]:

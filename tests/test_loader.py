@@ -266,3 +266,18 @@ def test_an_explicit_null_survives_the_round_trip(tmp_path):
     again = load_scenario(tmp_path / "scenario.yaml")
     assert again.fusion["kalman"].parameters.memory is None
     assert again.resolved() == scenario.resolved()
+
+
+def test_the_runs_temperature_reaches_an_mhd_ars_that_names_none(tmp_path):
+    warm = load(tmp_path, GOOD.replace("seed: 7", "seed: 7\ntemperature: 40 degC"))
+    own = load(
+        tmp_path,
+        GOOD.replace("seed: 7", "seed: 7\ntemperature: 40 degC").replace(
+            "preset: sx300", "preset: sx300, temperature: 10 degC"
+        ),
+    )
+    assert load(tmp_path).sensors["mhd_ars"].temperature == 293.15
+    assert warm.sensors["mhd_ars"].temperature == 313.15
+    assert own.sensors["mhd_ars"].temperature == 283.15
+    write_scenario(tmp_path, warm.resolved(), {})
+    assert load_scenario(tmp_path / "scenario.yaml").sensors["mhd_ars"].temperature == 313.15

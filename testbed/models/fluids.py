@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from testbed.errors import UnknownNameError
-from testbed.models.thermal_drift import TemperatureCoefficient, drift
+from testbed.models.thermal_drift import drift
 from testbed.parts import Part
-from testbed.units import Conductivity, MassDensity, Viscosity
+from testbed.units import Conductivity, MassDensity, RatioPerKelvin, Viscosity
 
 
 class Fluid(Part):
@@ -30,9 +30,9 @@ class Fluid(Part):
     density: MassDensity
     viscosity: Viscosity
     conductivity: Conductivity
-    density_drift: TemperatureCoefficient = 0.0
-    viscosity_drift: TemperatureCoefficient = 0.0
-    conductivity_drift: TemperatureCoefficient = 0.0
+    density_drift: RatioPerKelvin = 0.0
+    viscosity_drift: RatioPerKelvin = 0.0
+    conductivity_drift: RatioPerKelvin = 0.0
 
     @property
     def kinematic_viscosity(self) -> float:

@@ -25,9 +25,9 @@ from pydantic import Field, field_validator
 from testbed.models.channel_modes import ChannelModes, ChannelStage, channel_modes
 from testbed.models.chebyshev import chebyshev_points
 from testbed.models.fluids import FLUIDS, Fluid, NamedFluid
-from testbed.models.thermal_drift import TemperatureCoefficient, drift
+from testbed.models.thermal_drift import drift
 from testbed.parts import Part
-from testbed.units import Length, MagneticField
+from testbed.units import Length, MagneticField, RatioPerKelvin
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -76,7 +76,7 @@ class MhdChannel(Part):
     fluid: NamedFluid
     height: Length
     field: MagneticField
-    field_drift: TemperatureCoefficient = 0.0
+    field_drift: RatioPerKelvin = 0.0
     closure: Literal["local", "radial_field", "axial_field"] = "local"
     load_fraction: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     nodes: Annotated[int, Field(strict=True)] = 160

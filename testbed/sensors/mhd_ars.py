@@ -9,14 +9,14 @@ from pydantic import Field
 
 from testbed.models.channel_ring import ChannelRing
 from testbed.models.mhd_channel import MhdChannel
-from testbed.models.thermal_drift import REFERENCE, Temperature
+from testbed.models.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
 from testbed.sensors.noise_terms import NoiseStage, White
 from testbed.signals import random_stream
-from testbed.units import Duration, Frequency, ScaleFactor, Voltage
+from testbed.units import Duration, Frequency, Quantity, ScaleFactor, Temperature, Voltage
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -37,8 +37,8 @@ class MhdArs(Sensor, ElectronicTerms):
     channel : MhdChannel
         The fluid between its walls, at 20 degC.
     temperature : float
-        Of fluid and magnet, constant [K]. The calibration is that of 20 degC, so the magnet's drift shows in the
-        readings.
+        Of fluid and magnet, constant [K]; the scenario's temperature at t = 0 if that is given and this is not. The
+        calibration is that of 20 degC, so the magnet's drift shows in the readings.
     ring : ChannelRing, optional
         The channel's other dimensions; given, the Johnson noise of its resistance is added.
     gain : float
@@ -69,7 +69,7 @@ class MhdArs(Sensor, ElectronicTerms):
     temperature: Temperature = REFERENCE
     ring: ChannelRing | None = None
     gain: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
-    scale_factor_error: Annotated[float, Field(gt=-1.0, lt=1.0, allow_inf_nan=False)] = 0.0
+    scale_factor_error: Annotated[float, Quantity("", "0.5 %", above=-1.0)] = 0.0
     transformer: Transformer | None = None
     amplifier_pole: Frequency
     second_pole: Frequency | None = None
