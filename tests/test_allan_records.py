@@ -89,7 +89,11 @@ def test_rounded_times_are_even(tmp_path):
         ("1\n2\n3\n4\n", {"rate": "1", "unit": None}, "--unit: expected the unit of the column"),
         ("1\n2\n3\n4\n", {"rate": "1", "time_unit": "V"}, "--time-unit: expected a quantity in s"),
         ("1\n2\n3\n4\n", {"rate": "1", "sensor": "gyro"}, "--sensor: expected a run folder"),
-        ("0,1\n1,1\n2,1\n\n4,1\n5,1\n", {"time": "1"}, "log.csv:5: uneven or missing sample: time goes from 2 s to 4 s"),
+        (
+            "0,1\n1,1\n2,1\n\n4,1\n5,1\n",
+            {"time": "1"},
+            "log.csv:5: uneven or missing sample: time goes from 2 s to 4 s",
+        ),
         ("3,1\n2,1\n1,1\n0,1\n", {"time": "1"}, "--time: expected times that increase"),
     ],
 )

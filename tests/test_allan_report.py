@@ -31,13 +31,15 @@ def record(n=50_000, fs=100.0, seed=1, **terms):
 def white_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("records") / "static.csv"
     rate = np.degrees(record(angle_random_walk=N).rate)
-    np.savetxt(path, np.stack([np.arange(rate.size) / 100.0, rate], axis=1), delimiter=",", header="t,rate", comments="")
+    np.savetxt(
+        path, np.stack([np.arange(rate.size) / 100.0, rate], axis=1), delimiter=",", header="t,rate", comments=""
+    )
     return path
 
 
 @pytest.fixture(scope="module")
 def still_run(tmp_path_factory):
-    """A table that moves by 1 deg/s at 10 Hz, with a gyro that follows badly: its dynamics must not show."""
+    """Return a run whose table moves by 1 deg/s at 10 Hz, with a gyro that follows badly: its dynamics must not show."""
     folder = tmp_path_factory.mktemp("runs")
     path = short_file(folder, ("duration: 0.5 s", "duration: 1.5 s"))
     testbed.run(testbed.load_scenario(path), out=folder / "run")

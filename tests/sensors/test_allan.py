@@ -7,10 +7,12 @@ import allantools
 import numpy as np
 import pytest
 from allantools import ci
+from scipy.stats import binom
 
+from testbed.sensors import load_preset
 from testbed.sensors.allan import AllanCurve, allan_deviation, fit_allan
 from testbed.sensors.allan_freedom import equivalent_freedom
-from testbed.sensors.noise import GyroNoise
+from testbed.sensors.noise import GyroNoise, GyroTerms
 
 TERMS = ("quantization", "angle_random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
 
@@ -109,27 +111,51 @@ def test_fit_finds_each_term_alone_at_three_rates(name: str, fs: float) -> None:
     assert got.upper / got.lower < 1.6
 
 
+def preset_terms(**changed: float) -> dict[str, float]:
+    gyro = load_preset("adis16505")
+    return {**{name: getattr(gyro, name) for name in GyroTerms.model_fields}, **changed}
+
+
 @pytest.mark.slow
 @pytest.mark.oracle
-def test_fit_intervals_cover_the_coefficients_of_a_gyro() -> None:
-    # N and B of the ADIS16505 presets; a record of 1000 s at 100 Hz shows both, and no rate random walk.
-    true = {"angle_random_walk": 4.3633e-05, "bias_instability": 1.3090e-05 * 3, "rate_random_walk": 8.08e-09}
-    runs, fs = 200, 100.0
-    covered = dict.fromkeys(true, 0)
-    shown = dict.fromkeys(true, 0)
+@pytest.mark.parametrize(
+    ("changed", "fs", "n", "top", "seen", "hidden"),
+    [
+        # White noise and flicker cross at 25 s; below 0.1 mHz the preset's flicker is flat and no longer in the model,
+        # so the fit ends at 500 s. The walk would cross the flicker at 40 days.
+        pytest.param({}, 10.0, 100_000, 500.0, "NB", "K", id="10000 s at 10 Hz"),
+        # Without the flicker the walk crosses the white noise at 2.6 hours.
+        pytest.param({"bias_instability": 0.0}, 0.02, 100_000, math.inf, "NK", "", id="58 days at 0.02 Hz"),
+        pytest.param({}, 100.0, 6000, math.inf, "N", "BK", id="60 s at 100 Hz"),
+    ],
+)
+def test_intervals_cover_the_coefficients_of_a_preset(
+    changed: dict[str, float], fs: float, n: int, top: float, seen: str, hidden: str
+) -> None:
+    true = preset_terms(**changed)
+    names = dict(zip("QNBKR", TERMS, strict=True))
+    runs = 200
+    covered, shown, refused, unlikely = dict.fromkeys(seen + hidden, 0), dict.fromkeys(seen + hidden, 0), 0, 0
     for seed in range(runs):
-        fit = fit_allan(allan_deviation(GyroNoise(**true).sample(100_000, fs, seed), fs))
-        for name, value in true.items():
-            got = getattr(fit, name)
-            shown[name] += got.identified
-            covered[name] += got.lower <= value <= got.upper
-    # 99 % binomial band of 200 runs at 0.95.
-    for name in ("angle_random_walk", "bias_instability"):
-        assert 181 <= covered[name] <= 197, covered
-        assert shown[name] > 0.95 * runs
-    # An upper limit covers from below only, so it may always hold; a term that is not there is seen once in 700.
-    assert covered["rate_random_walk"] >= 181
-    assert shown["rate_random_walk"] <= 4
+        fit = fit_allan(allan_deviation(GyroNoise(**true).sample(n, fs, seed), fs).between(0.0, top))
+        refused += not fit.goodness.accepted
+        unlikely += fit.goodness.p_value < 0.05
+        for letter in covered:
+            got = getattr(fit, names[letter])
+            shown[letter] += got.identified
+            covered[letter] += got.lower <= true[names[letter]] <= got.upper
+    print(f"{runs} records: covered {covered}, shown as numbers {shown}, p < 0.05 {unlikely}, refused {refused}")
+    low, high = binom.interval(0.99, runs, 0.95)
+    for letter in seen:
+        assert shown[letter] == runs
+        assert low <= covered[letter] <= high
+    # A limit covers from below only, so it may always hold; a term that is not there is seen once in 700 fits.
+    for letter in hidden:
+        assert shown[letter] <= 4
+        assert covered[letter] >= 0.95 * runs
+    # A right model is refused once in a thousand, and its p is below 0.05 in one of twenty (99.9 % of such counts).
+    assert refused <= 3
+    assert unlikely <= binom.ppf(0.999, runs, 0.05)
 
 
 def test_fit_scales_with_the_unit() -> None:
