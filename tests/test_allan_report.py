@@ -121,6 +121,14 @@ def test_white_noise_of_the_mhd_ars_is_found_in_a_run(still_run):
     assert found.angle_random_walk.value == pytest.approx(np.hypot(1e-7, 8.2e-9), abs=margin)
 
 
+def test_the_record_of_a_run_begins_after_settling(still_run):
+    scenario = testbed.load_scenario(still_run / "scenario.yaml")
+    seconds = scenario.frame.duration - scenario.frame.settle
+    assert scenario.frame.settle > 0.0
+    for one in read_run(still_run):
+        assert one.rate.size == round(seconds * one.sample_rate_hz)
+
+
 def test_a_gap_in_the_readings_is_refused(still_run, monkeypatch):
     run = testbed.open_run(still_run)
     sensors = {name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate)) for name, s in run.sensors.items()}  # fmt: skip
