@@ -104,6 +104,32 @@ def report(run_dir: RunDir) -> None:
         typer.echo(f"wrote {write_report(run_dir)}")
 
 
+@app.command()
+def allan(
+    source: Annotated[Path, typer.Argument(metavar="FILE_OR_RUN", help="Text file with a rate record, or run folder.")],
+    column: Annotated[str | None, typer.Option(help="Column of a file by name, or by number from 1 on.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the column, such as deg/s.")] = None,
+    rate: Annotated[str | None, typer.Option(metavar="HZ", help="Sample rate of a file.")] = None,
+    time: Annotated[str | None, typer.Option(help="Column of the time, instead of --rate.")] = None,
+    time_unit: Annotated[str, typer.Option(help="Unit of the time.")] = "s",
+    sensor: Annotated[str | None, typer.Option(help="Sensor of a run; default all.")] = None,
+    min_tau: Annotated[float | None, typer.Option(metavar="S", help="Shortest averaging time of the fit.")] = None,
+    max_tau: Annotated[float | None, typer.Option(metavar="S", help="Longest averaging time of the fit.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Plot (.svg, .png, .pdf); default allan_<name>.svg here.")] = None,
+) -> None:
+    """Print the Allan coefficients of a record or of a run's sensors, and draw the deviation."""
+    from testbed.allan_records import read
+    from testbed.allan_report import allan_figure, analyse, figure_format, write_figure
+    from testbed.terminal import print_allan
+
+    if out is not None:
+        figure_format(out)
+    options = {"column": column, "unit": unit, "rate": rate, "time": time, "sensor": sensor}
+    analyses = [analyse(record, min_tau, max_tau) for record in read(source, time_unit=time_unit, **options)]
+    name = analyses[0].record.name if len(analyses) == 1 else source.resolve().name
+    print_allan(analyses, write_figure(allan_figure(analyses), out or Path(f"allan_{name}.svg")))
+
+
 def main() -> None:
     """Run the command line; errors become one clear message and the exit status of the contract."""
     signal.signal(signal.SIGTERM, _interrupt)

@@ -12,9 +12,10 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextC
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from testbed.allan_report import Analysis, Term
     from testbed.scenario import Scenario
 
 _PLAIN_EVERY = 5.0
@@ -171,3 +172,31 @@ def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
         console.print(f"[bold]{kind}s[/bold]")
         for name, line in names.items():
             console.print(f"  {name:<{width}}  {line}", soft_wrap=True, highlight=False)
+
+
+def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
+    """Print the coefficients with their intervals, limits as limits, or why there are none."""
+    from testbed.allan_report import TERMS
+
+    console = _console()
+    for analysis in analyses:
+        console.print(f"[bold]{analysis.record.content}[/bold]", soft_wrap=True, highlight=False)
+        console.print(
+            f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz", highlight=False
+        )
+        if analysis.fit.goodness.accepted:
+            table = Table("", "term", "value", "95 % interval", "unit", "value in SI", "SI unit")
+            for term in TERMS:
+                table.add_row(*_allan_row(analysis, term))
+            console.print(table)
+        console.print(analysis.verdict(), soft_wrap=True, highlight=False)
+    console.print(f"wrote {figure}", soft_wrap=True, highlight=False)
+
+
+def _allan_row(analysis: Analysis, term: Term) -> tuple[str, ...]:
+    found, name = analysis.coefficient(term), term.name.replace("_", " ")
+    if not found.identified:
+        limit = f"< {term.text(found.upper)}"
+        return term.letter, name, limit, "not identified", term.unit, f"< {found.upper:.3g}", term.si
+    interval = f"{term.text(found.lower)} to {term.text(found.upper)}"
+    return term.letter, name, term.text(found.value), interval, term.unit, f"{found.value:.4g}", term.si

@@ -6,14 +6,37 @@ import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chi2
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 # Strides per tau in the sum over lags; from this many samples per tau on, sampled noise counts as continuous.
 STRIDES = 64
+CONFIDENCE = 0.95
 # Averages below which the type of noise cannot be told.
 _AVERAGES = 30
+
+
+def chi_square_limits(variance: FloatArray, edf: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the 95 % limits of variances with these degrees of freedom.
+
+    Parameters
+    ----------
+    variance : ndarray, shape (n_tau,)
+        Estimated variances, any unit.
+    edf : ndarray, shape (n_tau,)
+        Their equivalent degrees of freedom [-].
+
+    Returns
+    -------
+    tuple of two ndarray, shape (n_tau,)
+        Lower and upper limits, unit of `variance`.
+    """
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low: FloatArray = variance * edf / chi2.ppf(1.0 - tail, edf)
+    high: FloatArray = variance * edf / chi2.ppf(tail, edf)
+    return low, high
 
 
 def curve_exponents(m: FloatArray, variance: FloatArray) -> FloatArray:
@@ -31,12 +54,13 @@ def curve_exponents(m: FloatArray, variance: FloatArray) -> FloatArray:
     ndarray, shape (n_tau,)
         2 (quantisation), 0, -1 or -2 [-].
     """
-    slope = np.full(m.size, -1.0)
     x, y = np.log(m), np.log(variance)
-    for i in range(m.size):
-        near = np.abs(x - x[i]) <= np.log(3.0)
-        if near.sum() > 1:
-            slope[i] = np.polyfit(x[near], y[near], 1)[0]
+    near = (np.abs(x - x[:, None]) <= np.log(3.0)).astype(np.float64)
+    count, mean_x, mean_y = near.sum(axis=1), near @ x, near @ y
+    mean_x, mean_y = mean_x / count, mean_y / count
+    # Straight lines through the neighbours; a lone averaging time counts as white noise.
+    run = near @ x**2 - count * mean_x**2
+    slope = np.where(count > 1.0, (near @ (x * y) - count * mean_x * mean_y) / np.where(count > 1.0, run, 1.0), -1.0)
     return _known_exponent(-1.0 - slope)
 
 

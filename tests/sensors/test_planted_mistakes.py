@@ -1,6 +1,30 @@
 """Checks of noise and instruments, run on the real code and on code with a well-known simulator's mistake planted.
 
-A check that passes on the mistake would be no check.
+A check that passes on the mistake would be no check. The defects are published ones; their plants and checks below:
+
+======================================  ===============================================  ================================
+where                                   defect                                           check that fails on it
+======================================  ===============================================  ================================
+NaveGo                                  rate random walk in steps of K dt                check_rate_random_walk
+RocketPy                                precedence makes the random walk white           check_rate_random_walk
+RocketPy                                unit in prose only                               check_units
+gnss-ins-sim                            input density changed in place                   check_inputs_unchanged
+gnss-ins-sim                            noise repeats every 16384 samples                check_no_period
+gnss-ins-sim                            custom profile overwrites the built-in one       check_presets_apart
+Basilisk                                noise per step, so it depends on the task rate   check_angle_random_walk,
+                                                                                         check_rate_of_the_task
+Basilisk                                two instruments share a seed                     check_streams, check_axes
+Pegasus, PX4, RotorS, S2E, Elodin       wrong time constant                              check_markov
+Pegasus, PX4, RotorS, S2E, Elodin       bias added every step                            check_markov, check_turn_on
+Pegasus, PX4, RotorS, S2E, Elodin       misspelt key silently ignored                    check_unknown_key
+Pegasus, PX4, RotorS, S2E, Elodin       key without effect                               check_every_key_counts
+Pegasus, PX4, RotorS, S2E, Elodin       one random number on three axes                  check_axes
+Pegasus, PX4, RotorS, S2E, Elodin       one key of the generator for two terms           check_streams
+Isaac Lab, Gazebo                       wrong dt: sensor rate is not the physics rate    check_dynamics_at_two_rates,
+                                                                                         check_rate_of_the_task
+Isaac Lab, Gazebo                       every n-th value taken without a filter          check_aliasing
+MuJoCo sysid.apply_delay                writes into its input                            check_inputs_unchanged
+======================================  ===============================================  ================================
 """
 
 from __future__ import annotations
@@ -15,11 +39,11 @@ import pytest
 from pydantic import ConfigDict, ValidationError
 from scipy import stats
 
-from testbed import sensors
-from testbed.sensors import base, load_preset, mems_gyro, noise, noise_terms
+from testbed import sensors, units
+from testbed.sensors import allan, base, load_preset, mems_gyro, noise, noise_terms
 from testbed.sensors.allan import allan_deviation
 from testbed.sensors.allan_freedom import equivalent_freedom
-from testbed.signals import LinearFilter
+from testbed.signals import LinearFilter, random_stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,9 +94,10 @@ def check_rate_random_walk() -> None:
 
 def check_rate_ramp() -> None:
     """R t from the sample's number: after a million samples within the two roundings on either side, 4 * eps / 2."""
-    slope, fs = 1e-6, 2000.0
-    record = noise.GyroNoise(rate_ramp=slope).sample(1_000_000, fs, 0)
-    np.testing.assert_allclose(record, slope * np.arange(1_000_000) / fs, rtol=4.5e-16, atol=0)
+    slope = 1e-6
+    for fs in RATES:
+        record = noise.GyroNoise(rate_ramp=slope).sample(1_000_000, fs, 0)
+        np.testing.assert_allclose(record, slope * np.arange(1_000_000) / fs, rtol=4.5e-16, atol=0)
 
 
 def check_markov() -> None:
@@ -93,6 +118,29 @@ def check_white() -> None:
         record = noise.GyroNoise(angle_random_walk=N).sample(100_000, fs, 5)
         assert stats.kstest(record / (N * math.sqrt(fs)), "norm").pvalue > 1e-4
         assert abs(np.corrcoef(record[1:], record[:-1])[0, 1]) < 5.0 / math.sqrt(record.size)
+
+
+def check_electronic() -> None:
+    """Compare white and 1/f noise of an amplifier with their closed-form Allan variances, each alone, at three rates."""
+    n, m, density = 200_000, 64, 1e-7
+    spread = 5.0 * math.sqrt(2.0 / equivalent_freedom(m, n + 1, -1))
+    for fs in RATES:
+        knee = fs / 50.0
+        terms = noise.ElectronicTerms(noise_density=density, noise_knee=knee).noise_terms(fs, 6, "mhd_ars")
+        # n^2 f_knee / f is the flicker of B^2 = 2 pi f_knee n^2; its margin as in `check_allan`.
+        wanted = {"white": density**2 * fs / m, "flicker": 4.0 * math.log(2.0) * knee * density**2}
+        for name, variance in wanted.items():
+            got = allan_deviation(terms[name].process(n), fs, [m / fs]).deviation[0] ** 2
+            assert abs(got / variance - 1.0) < spread + 0.016, (fs, name, got / variance)
+
+
+def check_turn_on() -> None:
+    """Expect a Markov bias to begin with its own standard deviation and to keep it: nothing adds up."""
+    std, runs = 1e-4, 1000
+    term = noise.GyroNoise(markov_bias=std, markov_time=0.01)
+    records = np.array([term.sample(2000, 2000.0, seed)[[0, -1]] for seed in range(runs)])
+    # One second is a hundred time constants; 5 sigma of a variance of this many normal values.
+    assert np.all(np.abs(np.var(records, axis=0) / std**2 - 1.0) < 5.0 * math.sqrt(2.0 / runs))
 
 
 def check_no_period() -> None:
@@ -120,6 +168,16 @@ def check_streams() -> None:
     assert np.abs(correlation).max() < 5.0 * math.sqrt(1.5 / n)
 
 
+def check_axes() -> None:
+    """Instruments of one run read independent noise: three gyros as three axes, and another kind of sensor."""
+    still = np.zeros(200_000)
+    named = [("x", "adis16505"), ("y", "adis16505"), ("z", "adis16505"), ("mhd", "sx300")]
+    records = [load_preset(kind).start(20000.0, 1, name).process(still) for name, kind in named]
+    records[-1] = records[-1][::10]
+    # 20000 readings at 2 kHz behind 480 Hz: neighbours correlate over 1 / (4 * 480 s) = two readings at most.
+    assert np.abs(np.corrcoef(records) - np.eye(4)).max() < 5.0 * math.sqrt(2.0 / 20_000)
+
+
 def check_switching_off() -> None:
     """Each term keeps its bits when any other is switched off."""
     full = {k: term.process(1000) for k, term in noise.GyroNoise(**FULL).noise_terms(2000.0, 7, "gyro").items()}
@@ -128,6 +186,11 @@ def check_switching_off() -> None:
         assert set(rest) == set(full) - {off}
         for name, term in rest.items():
             assert np.array_equal(term.process(1000), full[name])
+    amplifier = [
+        noise.ElectronicTerms(noise_density=N, noise_knee=knee).noise_terms(2000.0, 7, "mhd_ars")["white"].process(1000)
+        for knee in (10.0, None)
+    ]
+    assert np.array_equal(*amplifier)
     alone = {k: noise.GyroNoise(**{k: v}).start(2000.0, 7, "gyro").process(1000) for k, v in FULL.items()}
     for first, second in itertools.combinations(alone, 2):
         shared = np.corrcoef(np.diff(alone[first]), np.diff(alone[second]))[0, 1]
@@ -182,7 +245,14 @@ def check_inputs_unchanged() -> None:
         assert np.array_equal(record, before)
         record.flags.writeable = False
         load_preset(name).sample(record, 20000.0)
+    frozen = np.geomspace(0.1, 10.0, 20)
+    frozen.flags.writeable = False
+    for name in ("sx300", "adis16505"):
+        load_preset(name).response(frozen)
+        load_preset(name).input_noise_psd(frozen)
+    noise.GyroNoise(**FULL).noise_psd(frozen, 100.0)
     allan_deviation(record, 100.0)
+    allan_deviation(record, 100.0, frozen[frozen < 5.0])
 
 
 def check_blocks() -> None:
@@ -194,6 +264,16 @@ def check_blocks() -> None:
         for cuts in ([1, 2, 3, 20_001], [7, 16_384, 16_391, 40_000], list(range(13, 50_000, 4099))):
             stage = sensor.start(20000.0, 9, "sensor")
             assert np.array_equal(np.concatenate([stage.process(b) for b in np.split(record, cuts)]), whole)
+
+
+def check_units() -> None:
+    """Expect a quantity from a file to need its unit, and the unit its dimension."""
+    border = {"context": {"border": True}}
+    good = noise.GyroNoise.model_validate({"angle_random_walk": "0.15 deg/sqrt(h)"}, **border)
+    assert good.angle_random_walk == pytest.approx(np.deg2rad(0.15) / 60.0, rel=1e-14, abs=0)
+    for bad in (0.15, "0.15", "0.15 deg/h", "0.15 K", "0.15 deg/sqrt(m)"):
+        with pytest.raises(ValidationError):
+            noise.GyroNoise.model_validate({"angle_random_walk": bad}, **border)
 
 
 def check_unknown_key() -> None:
@@ -227,15 +307,19 @@ CHECKS: list[Callable[[], None]] = [
     check_rate_random_walk,
     check_rate_ramp,
     check_markov,
+    check_turn_on,
+    check_electronic,
     check_white,
     check_no_period,
     check_streams,
+    check_axes,
     check_switching_off,
     check_rate_of_the_task,
     check_dynamics_at_two_rates,
     check_aliasing,
     check_inputs_unchanged,
     check_blocks,
+    check_units,
     check_unknown_key,
     check_every_key_counts,
     check_presets_apart,
@@ -307,6 +391,15 @@ def plant_bias_added_every_step(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(noise, "markov", lambda s, t, fs, stream: Walk(0.0, s * math.sqrt(2.0 / (t * fs)))(stream))
 
 
+def plant_bias_from_zero(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(noise_terms, "_stationary_root", lambda decay, gain: np.zeros((decay.size, decay.size)))
+
+
+def plant_one_sided_electronics(patch: pytest.MonkeyPatch) -> None:
+    # A vendor's one-sided density taken for a two-sided one: the 1/f part alone has the factor of two.
+    patch.setattr(noise, "flicker", lambda level, *rest: noise_terms.flicker(level * math.sqrt(2.0), *rest))
+
+
 def plant_euler_markov(patch: pytest.MonkeyPatch) -> None:
     # Equation (22) of the paper as printed: gain beta B sqrt(dT), which is no standard deviation of B.
     patch.setattr(noise, "markov", lambda s, t, fs, stream: Walk(1.0 / (t * fs), s / t / math.sqrt(fs))(stream))
@@ -335,6 +428,14 @@ def plant_one_stream_per_sensor(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(noise, "random_stream", lambda seed, *names: np.random.default_rng([seed, len(names[0])]))
 
 
+def plant_owner_forgotten(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(noise, "random_stream", lambda seed, *names: random_stream(seed, names[-1]))
+
+
+def plant_one_number_on_three_axes(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(mems_gyro.MemsGyro, "start", lambda self, fs, seed, name: mems_gyro.MemsGyroStage(self, fs, seed, ""))
+
+
 def plant_streams_in_order_of_use(patch: pytest.MonkeyPatch) -> None:
     counter = itertools.count()
     patch.setattr(noise, "random_stream", lambda seed, *names: np.random.default_rng([seed, next(counter)]))
@@ -354,6 +455,41 @@ def plant_input_written(patch: pytest.MonkeyPatch) -> None:
         return self._converter.process(self._decimator.process(self._low_pass.process(true_rate)))
 
     patch.setattr(mems_gyro.MemsGyroStage, "process", process)
+
+
+def plant_density_changed_in_place(patch: pytest.MonkeyPatch) -> None:
+    original = noise.GyroTerms.noise_psd
+
+    def noise_psd(self: Any, freq_hz: FloatArray, sample_rate_hz: float) -> FloatArray:
+        freq_hz *= 1.0
+        return original(self, freq_hz, sample_rate_hz)
+
+    patch.setattr(noise.GyroTerms, "noise_psd", noise_psd)
+
+
+def plant_mean_removed_in_place(patch: pytest.MonkeyPatch) -> None:
+    def checked(rate: FloatArray, _: float) -> FloatArray:
+        rate -= rate.mean()
+        return rate
+
+    patch.setattr(allan, "_checked", checked)
+
+
+def plant_unit_in_prose_only(patch: pytest.MonkeyPatch) -> None:
+    original = units.Quantity._read
+    patch.setattr(units.Quantity, "_read", lambda self, value, border: original(self, value, border=False))
+
+
+def plant_dimension_unchecked(patch: pytest.MonkeyPatch) -> None:
+    original = units._factor
+
+    def factor(unit: str, si: str, **options: Any) -> float:
+        try:
+            return original(unit, si, **options)
+        except ValueError:
+            return 1.0
+
+    patch.setattr(units, "_factor", factor)
 
 
 def plant_clock_restarted_per_block(patch: pytest.MonkeyPatch) -> None:
@@ -410,16 +546,27 @@ PLANTS: list[tuple[Callable[[pytest.MonkeyPatch], None], Callable[[], None]]] = 
     (plant_accumulated_ramp, check_rate_ramp),
     (plant_wrong_time_constant, check_markov),
     (plant_bias_added_every_step, check_markov),
+    (plant_bias_added_every_step, check_turn_on),
+    (plant_bias_from_zero, check_turn_on),
+    (plant_one_sided_electronics, check_electronic),
+    (plant_one_sided_density, check_electronic),
     (plant_euler_markov, check_markov),
     (plant_uniform_noise, check_white),
     (plant_periodic_noise, check_no_period),
     (plant_shared_stream, check_streams),
     (plant_shared_stream, check_switching_off),
     (plant_one_stream_per_sensor, check_streams),
+    (plant_owner_forgotten, check_streams),
+    (plant_owner_forgotten, check_axes),
+    (plant_one_number_on_three_axes, check_axes),
     (plant_streams_in_order_of_use, check_switching_off),
     (plant_filter_at_reading_rate, check_dynamics_at_two_rates),
     (plant_decimation_without_filter, check_aliasing),
     (plant_input_written, check_inputs_unchanged),
+    (plant_density_changed_in_place, check_inputs_unchanged),
+    (plant_mean_removed_in_place, check_inputs_unchanged),
+    (plant_unit_in_prose_only, check_units),
+    (plant_dimension_unchecked, check_units),
     (plant_clock_restarted_per_block, check_blocks),
     (plant_state_lost_between_blocks, check_blocks),
     (plant_misspelt_key_ignored, check_unknown_key),
