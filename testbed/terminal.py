@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from contextlib import contextmanager
@@ -12,10 +13,11 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextC
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from testbed.scenario import Scenario
+    from testbed.table_facts import TableFacts
 
 _PLAIN_EVERY = 5.0
 
@@ -103,12 +105,36 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         for name, row in metrics[kind].items():
             table.add_row(*_row(name, row, shown), end_section=name == list(metrics[kind])[-1])
     console.print(table)
+    _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
         console.print(
             f"expected {bound['subject']} {bound['metric']} {bound['bound']}: {_number(bound['value'])} {verdict}"
         )
     console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+
+
+def _print_table(console: Console, table: Mapping[str, Any]) -> None:
+    """Print how the turntable did."""
+    followed = ", ".join(
+        f"{name} {_number(table[f'command_to_{name}_rms_deg_s'])} deg/s rms{_gain(table[f'command_to_{name}_lines'])}"
+        for name in ("encoder", "inertial")
+    )
+    torque = f"peak torque {_number(table['peak_torque_nm'])} N m"
+    if table["torque_limit_nm"] is not None:
+        torque += f" of {_number(table['torque_limit_nm'])} N m, margin {100 * table['torque_margin']:.0f} %"
+    noise = f"arithmetic noise of the truth {_number(table['truth_noise_deg_s'])} deg/s"
+    console.print(f"turntable: command to {followed}; {torque}; {noise}", soft_wrap=True, highlight=False)
+
+
+def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Return the line that is followed worst, in words."""
+    known = [line for line in lines if line["gain"] is not None]
+    if not known:
+        return ""
+    worst = max(known, key=lambda line: abs(line["gain"] - 1.0))
+    change = f"{100 * (worst['gain'] - 1.0):+.2g} %, {worst['phase_deg']:+.2g} deg"
+    return f" ({change} at {_number(worst['frequency_hz'])} Hz)"
 
 
 def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
@@ -122,8 +148,8 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
     return cells
 
 
-def print_scenario(scenario: Scenario) -> None:
-    """Print every key of a scenario: as written, and in SI."""
+def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
+    """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = _console()
     written = {key: f"{value} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
         _leaves(dict(scenario.source))
@@ -135,7 +161,20 @@ def print_scenario(scenario: Scenario) -> None:
         if value not in ("", None):
             table.add_row(key, str(written.get(key, "")), str(value))
     console.print(table)
+    _print_facts(console, facts)
     console.print("The scenario is valid.")
+
+
+def _print_facts(console: Console, facts: TableFacts) -> None:
+    modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
+    torque = f"required torque {facts.required_torque:.4g} N m"
+    if facts.torque_limit is not None:
+        used = facts.required_torque / facts.torque_limit
+        torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
+    noise = f"arithmetic noise of the truth {_number(math.degrees(facts.truth_noise))} deg/s rms"
+    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise):
+        if line:
+            console.print(f"turntable: {line}", soft_wrap=True, highlight=False)
 
 
 def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -111,8 +111,14 @@ def test_phases_that_are_not_given_come_from_the_seed_and_given_ones_do_not():
 
 @pytest.mark.parametrize(
     ("part", "key", "value"),
-    [("harmonics", "number", 1.5), ("harmonics", "coefficient", 2e-6), ("harmonics", "phase", 0.5)]
-    + [("modes", "frequency", 41.0), ("modes", "damping", 0.02), ("modes", "gain", 0.6)],
+    [
+        ("harmonics", "number", 1.5),
+        ("harmonics", "coefficient", 2e-6),
+        ("harmonics", "phase", 0.5),
+        ("modes", "frequency", 41.0),
+        ("modes", "damping", 0.02),
+        ("modes", "gain", 0.6),
+    ],
 )
 def test_every_number_of_a_harmonic_and_a_mode_changes_the_motion(part, key, value):
     base = wheel(modes=(StructuralMode(frequency=42.0, damping=0.01, gain=0.5),))
