@@ -32,7 +32,7 @@ class Judge:
         self._scenario = scenario
         self._rates = chain.rates
         self._errors = {name: ErrorMetrics(scenario.lines) for name in (*scenario.sensors, *scenario.fusion)}
-        self._table = TableMetrics(scenario)
+        self._table = TableMetrics(scenario, chain.step)
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import TruthBlock, Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.sensors.base import ProfiledStage
-from testbed.signals import random_stream
+from testbed.step_choice import choose_step, profile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from testbed.fusion import EstimateBlock
+    from testbed.models.motion import CommandBlock
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
@@ -65,13 +65,17 @@ class Chain:
 
     def __init__(self, scenario: Scenario) -> None:
         frame = scenario.frame
-        terms = [
-            motion.start(frame.duration, random_stream(frame.seed, "motion", str(i), kind))
-            for i, (kind, motion) in enumerate(scenario.motion)
-        ]
-        self._motion = MotionProfile(terms, frame.ramp_in, BASE_RATE_HZ)
+        self._motion = profile(scenario)
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        self.turntable = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE)
+        self.step = choose_step(scenario)
+        self.turntable = Turntable(
+            scenario.turntable,
+            mountings,
+            BASE_RATE_HZ,
+            substeps=self.step.substeps,
+            holds=self.step.holds,
+            pose_stride=POSE_STRIDE,
+        )
         self._sensors = {
             name: sensor.start(BASE_RATE_HZ, frame.seed, name) for name, sensor in scenario.sensors.items()
         }
@@ -88,7 +92,7 @@ class Chain:
     def process(self, n_time: int) -> RunBlock:
         """Advance everything by `n_time` base samples."""
         command = self._motion.process(n_time)
-        truth = self.turntable.process(command)
+        truth = self.turntable.process(command, self._motion.peek(self.turntable.lookahead))
         readings, profiles = {}, {}
         for name, stage in self._sensors.items():
             readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start)

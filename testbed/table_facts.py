@@ -9,13 +9,13 @@ import numpy as np
 
 from testbed.checks import command_peaks
 from testbed.metrics import ErrorMetrics
-from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.table_modes import coupled_modes
 from testbed.models.turntable import Turntable, TurntableParameters
 from testbed.scenario import BASE_RATE_HZ
-from testbed.signals import random_stream
+from testbed.step_choice import StepChoice, choose_step, excerpt
 
 if TYPE_CHECKING:
+    from testbed.models.motion import CommandBlock
     from testbed.pipeline import RunBlock
     from testbed.scenario import Scenario
     from testbed.signals import FloatArray
@@ -57,6 +57,8 @@ class TableFacts:
         What the motor gives [N m]; None where the mode knows no limit.
     truth_noise : float
         Arithmetic noise of the truth, rms [rad/s].
+    step : StepChoice
+        How the plant is integrated.
     """
 
     freq_hz: FloatArray
@@ -64,45 +66,25 @@ class TableFacts:
     required_torque: float
     torque_limit: float | None
     truth_noise: float
+    step: StepChoice
 
 
-def table_facts(scenario: Scenario) -> TableFacts:
+def table_facts(scenario: Scenario, step: StepChoice | None = None) -> TableFacts:
     """Compute what is known before the run; it plays the command once, without a plant.
 
     Parameters
     ----------
     scenario : Scenario
         What would run.
+    step : StepChoice, optional
+        How its plant is integrated, if that is known already.
     """
     parameters = scenario.turntable
     moves = parameters.mode not in {"ideal", "fixed"}
     modes = coupled_modes(parameters) if moves else (np.empty(0), np.empty(0))
     torque = 0.0 if parameters.mode == "fixed" else command_peaks(scenario)[1]
-    noise = truth_noise(parameters, excerpt(scenario, 0, min(_NOISE_STEPS, scenario.n_time)))
-    return TableFacts(*modes, torque, parameters.torque_limit if moves else None, noise)
-
-
-def excerpt(scenario: Scenario, start: int, n_time: int) -> CommandBlock:
-    """Return a part of the commanded motion at its full size, without the ramp-in, as a block from 0.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Whose motion.
-    start, n_time : int
-        First base step and number of steps.
-    """
-    frame, begin = scenario.frame, start / BASE_RATE_HZ
-    terms = [
-        motion.start(frame.duration, random_stream(frame.seed, "motion", str(i), kind))
-        for i, (kind, motion) in enumerate(scenario.motion)
-    ]
-    whole = MotionProfile(terms, 0.0, BASE_RATE_HZ)
-
-    def part(t: FloatArray) -> FloatArray:
-        return whole.rate(t + begin)
-
-    return MotionProfile([part], 0.0, BASE_RATE_HZ).process(n_time)
+    noise = truth_noise(parameters, excerpt(scenario).process(min(_NOISE_STEPS, scenario.n_time)))
+    return TableFacts(*modes, torque, parameters.torque_limit if moves else None, noise, step or choose_step(scenario))
 
 
 def truth_noise(parameters: TurntableParameters, command: CommandBlock) -> float:
@@ -137,10 +119,12 @@ class TableMetrics:
     ----------
     scenario : Scenario
         What runs.
+    step : StepChoice, optional
+        How its plant is integrated, if that is known already.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(self, scenario: Scenario, step: StepChoice | None = None) -> None:
+        self._scenario, self._step = scenario, step
         self._settle = round(scenario.frame.settle * BASE_RATE_HZ)
         self._errors = {name: ErrorMetrics(scenario.lines) for name in ("encoder", "inertial")}
         self._peak = 0.0
@@ -157,9 +141,9 @@ class TableMetrics:
 
     def result(self) -> dict[str, Any]:
         """Return the entry "turntable" of metrics.json; deg/s, N m, Hz, None where undefined."""
-        facts = table_facts(self._scenario)
+        facts = table_facts(self._scenario, self._step)
         limit = facts.torque_limit
-        entry: dict[str, Any] = {"mode": self._scenario.turntable.mode, "step_s": 1.0 / BASE_RATE_HZ}
+        entry: dict[str, Any] = {"mode": self._scenario.turntable.mode, **_step(facts.step)}
         for name, errors in self._errors.items():
             result = errors.result()
             entry[f"command_to_{name}_rms_deg_s"] = result["rmse_deg_s"]
@@ -173,3 +157,7 @@ class TableMetrics:
             "modes_hz": facts.freq_hz.tolist(),
             "modes_damping": facts.damping.tolist(),
         }
+
+
+def _step(choice: StepChoice) -> dict[str, Any]:
+    return {"step_s": choice.step, "step_error": choice.error, "step_factor": choice.holds / choice.substeps}

@@ -124,7 +124,13 @@ def _print_table(console: Console, table: Mapping[str, Any]) -> None:
     if table["torque_limit_nm"] is not None:
         torque += f" of {_number(table['torque_limit_nm'])} N m, margin {100 * table['torque_margin']:.0f} %"
     noise = f"arithmetic noise of the truth {_number(table['truth_noise_deg_s'])} deg/s"
-    console.print(f"turntable: command to {followed}; {torque}; {noise}", soft_wrap=True, highlight=False)
+    step = _step(table["step_s"], table["step_factor"], table["step_error"])
+    console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True, highlight=False)
+
+
+def _step(step: float, factor: float, error: float | None) -> str:
+    measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
+    return f"integration step {1e6 * step:g} us, {factor:g} times the hold{measured}"
 
 
 def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
@@ -172,7 +178,8 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
     noise = f"arithmetic noise of the truth {_number(math.degrees(facts.truth_noise))} deg/s rms"
-    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise):
+    step = _step(facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:
             console.print(f"turntable: {line}", soft_wrap=True, highlight=False)
 

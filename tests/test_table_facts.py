@@ -12,7 +12,8 @@ from testbed.models.table_modes import coupled_modes
 from testbed.models.turntable import Turntable, TurntableParameters
 from testbed.pipeline import simulate
 from testbed.scenario import BASE_RATE_HZ
-from testbed.table_facts import TableMetrics, excerpt, table_facts, truth_noise
+from testbed.step_choice import excerpt
+from testbed.table_facts import TableMetrics, table_facts, truth_noise
 from testbed.terminal import print_metrics, print_scenario
 from tests.scenes import short
 
@@ -79,7 +80,7 @@ def test_fixed_table_follows_exactly_and_knows_no_torque(tmp_path):
 
 def test_excerpt_is_the_motion_without_its_ramp_in(run):
     scenario, _, _ = run
-    block = excerpt(scenario, 1234, 100)
+    block = excerpt(scenario, 1234).process(100)
     t = np.arange(1234, 1335) / BASE_RATE_HZ
     np.testing.assert_allclose(block.rate, DEG * np.sin(2 * np.pi * 10.0 * t), rtol=0.0, atol=1e-14 * DEG)
     assert block.start == 0
@@ -88,7 +89,7 @@ def test_excerpt_is_the_motion_without_its_ramp_in(run):
 @pytest.mark.parametrize("mode", ["servo", "ideal"])
 def test_arithmetic_noise_of_the_truth(mode, run):
     scenario, _, _ = run
-    noise = truth_noise(TurntableParameters(mode=mode), excerpt(scenario, 0, 2000))
+    noise = truth_noise(TurntableParameters(mode=mode), excerpt(scenario).process(2000))
     print(f"arithmetic noise of the truth, mode {mode}: {noise:.1e} rad/s rms")
     # An angle of a radian is known to eps; the servo's 133 Hz turns it into a rate, the bearing's 600 Hz at most.
     assert 0.0 < noise < np.finfo(float).eps * 2 * np.pi * 600.0

@@ -1,0 +1,188 @@
+"""The integration step of a run: as given, or as large as the truth allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.errors import RunError, ScenarioError
+from testbed.models.motion import MotionProfile
+from testbed.models.servo import required_torque
+from testbed.models.turntable import Turntable
+from testbed.scenario import BASE_RATE_HZ
+from testbed.signals import random_stream
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from testbed.models.turntable import TruthBlock, TurntableParameters
+    from testbed.scenario import Scenario
+    from testbed.signals import FloatArray
+
+TRUTH_ERROR = 1e-6
+# What is measured on an excerpt may be at most half of what is promised for the run.
+_MARGIN = 2.0
+_MOST_HOLDS = 8
+_EXCERPT, _RAMP_IN, _BLOCK = 5000, 0.05, 20_000
+# A table that does not move has no rate to compare with [rad/s].
+_LEAST_RATE = 1e-6
+_LEAPS = ("servo", "ideal")
+
+
+@dataclass(frozen=True)
+class StepChoice:
+    """How the plant of a run is integrated.
+
+    Parameters
+    ----------
+    holds : int
+        Base steps per integration step.
+    substeps : int
+        Integration steps per base step; one of both is 1.
+    error : float or None
+        Largest change of a true rate against the base step, over the largest rate [-], as measured on excerpts of the
+        scenario; None if the step is not longer than the base step.
+    """
+
+    holds: int = 1
+    substeps: int = 1
+    error: float | None = None
+
+    @property
+    def step(self) -> float:
+        """Integration step [s]."""
+        return self.holds / self.substeps / BASE_RATE_HZ
+
+
+def choose_step(scenario: Scenario) -> StepChoice:
+    """Return the step that the scenario asks for.
+
+    `auto` takes the most base steps, up to 8, whose error is below half of 1e-6 of the largest rate. It is measured on
+    excerpts of a quarter of a second: where the rate, the torque and the third derivative of the rate are largest.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With `step` in its turntable.
+
+    Raises
+    ------
+    ScenarioError
+        If a given step is neither a multiple nor a whole part of the base step.
+    """
+    choice = given_step(scenario.turntable)
+    if scenario.turntable.mode == "fixed":
+        return StepChoice()
+    if choice.holds > 1:
+        return replace(choice, error=max(_errors(scenario, choice.holds)))
+    if scenario.turntable.step != "auto" or scenario.turntable.mode not in _LEAPS:
+        return choice
+    for holds in range(2, _MOST_HOLDS + 1):
+        try:
+            error = max(_errors(scenario, holds))
+        except (ScenarioError, RunError):
+            break  # a mode is too fast for this step
+        if error >= TRUTH_ERROR / _MARGIN:
+            break
+        choice = StepChoice(holds, 1, error)
+    return choice
+
+
+def excerpt(scenario: Scenario, start: int = 0, ramp_in: float = 0.0) -> MotionProfile:
+    """Return the commanded motion from base step `start` on as if it were the beginning, angle 0.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose motion.
+    start : int, optional
+        First base step.
+    ramp_in : float, optional
+        Ramp-in instead of the scenario's [s].
+    """
+    whole, begin = profile(scenario, 0.0), start / BASE_RATE_HZ
+
+    def part(t: FloatArray) -> FloatArray:
+        return whole.rate(t + begin)
+
+    return MotionProfile([part], ramp_in, BASE_RATE_HZ)
+
+
+def profile(scenario: Scenario, ramp_in: float | None = None) -> MotionProfile:
+    """Return the commanded motion of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose motion, of its seed.
+    ramp_in : float, optional
+        Instead of the scenario's [s].
+    """
+    frame = scenario.frame
+    terms = [
+        motion.start(frame.duration, random_stream(frame.seed, "motion", str(i), kind))
+        for i, (kind, motion) in enumerate(scenario.motion)
+    ]
+    return MotionProfile(terms, frame.ramp_in if ramp_in is None else ramp_in, BASE_RATE_HZ)
+
+
+def given_step(parameters: TurntableParameters) -> StepChoice:
+    """Return the step that the parameters give, its error not yet measured; the base step for `auto`.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        With their `step`.
+
+    Raises
+    ------
+    ScenarioError
+        If it is neither a multiple nor a whole part of the base step, or a multiple where each hold is a step.
+    """
+    if parameters.step == "auto":
+        return StepChoice()
+    ratio, base = float(parameters.step) * BASE_RATE_HZ, f"{1e6 / BASE_RATE_HZ:g} us"
+    holds, substeps = max(round(ratio), 1), max(round(1.0 / ratio), 1)
+    if abs(holds / substeps - ratio) > 1e-9 * ratio:
+        msg = f"expected auto, or {base} times or divided by a whole number, got {ratio / BASE_RATE_HZ * 1e6:g} us"
+        raise ScenarioError(msg)
+    if holds > 1 and parameters.mode not in (*_LEAPS, "fixed"):
+        msg = f"expected at most {base} in mode {parameters.mode}, got {ratio / BASE_RATE_HZ * 1e6:g} us"
+        raise ScenarioError(msg)
+    return StepChoice(holds, substeps)
+
+
+def _errors(scenario: Scenario, holds: int) -> Iterator[float]:
+    """Yield the error of a step on each excerpt."""
+    starts, scale = _hardest(scenario)
+    n_time = min(_EXCERPT, scenario.n_time)
+    for start in sorted({min(max(k - n_time // 2, 0), scenario.n_time - n_time) for k in starts}):
+        base, long = (_play(scenario, start, n_time, m) for m in (1, holds))
+        change = max(float(np.max(np.abs(a - b))) for a, b in zip(_rates(base), _rates(long), strict=True))
+        yield change / max(scale, _LEAST_RATE)
+
+
+def _play(scenario: Scenario, start: int, n_time: int, holds: int) -> TruthBlock:
+    mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
+    table = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, holds=holds)
+    motion = excerpt(scenario, start, _RAMP_IN)
+    command = motion.process(n_time)
+    return table.process(command, motion.peek(table.lookahead))
+
+
+def _rates(truth: TruthBlock) -> tuple[FloatArray, ...]:
+    return truth.rate, truth.encoder_rate, *truth.sensor_rate.values()
+
+
+def _hardest(scenario: Scenario) -> tuple[list[int], float]:
+    """Return the base steps of largest rate, torque and third derivative of the rate, and the largest rate."""
+    motion, peaks, places = profile(scenario), [-1.0] * 3, [0] * 3
+    for start in range(0, scenario.n_time, _BLOCK):
+        command = motion.process(min(_BLOCK, scenario.n_time - start))
+        torque = required_torque(scenario.turntable, command, BASE_RATE_HZ)
+        for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
+            if measure.size and float(np.max(measure)) > peaks[i]:
+                peaks[i], places[i] = float(np.max(measure)), start + int(np.argmax(measure))
+    return places, peaks[0]
