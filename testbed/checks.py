@@ -71,10 +71,18 @@ def _check_plant(scenario: Scenario, document: Document) -> None:
     parameters = scenario.turntable
     try:
         given_step(parameters)
-        if parameters.mode == "servo":
-            check_modes(parameters, 1.0 / BASE_RATE_HZ if parameters.step == "auto" else float(parameters.step))
     except ScenarioError as error:
-        document.find(("turntable", "step"), "; ".join(problem.message for problem in error.problems))
+        document.find(("turntable", "step"), _reasons(error))
+        return
+    if parameters.mode == "servo":
+        try:
+            check_modes(parameters, 1.0 / BASE_RATE_HZ if parameters.step == "auto" else float(parameters.step))
+        except ScenarioError as error:
+            document.find(("turntable",), _reasons(error))
+
+
+def _reasons(error: ScenarioError) -> str:
+    return "; ".join(problem.message for problem in error.problems)
 
 
 def _check_expectations(scenario: Scenario, document: Document) -> None:

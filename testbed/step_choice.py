@@ -15,8 +15,6 @@ from testbed.scenario import BASE_RATE_HZ
 from testbed.signals import random_stream
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from testbed.models.turntable import TruthBlock, TurntableParameters
     from testbed.scenario import Scenario
     from testbed.signals import FloatArray
@@ -76,12 +74,13 @@ def choose_step(scenario: Scenario) -> StepChoice:
     if scenario.turntable.mode == "fixed":
         return StepChoice()
     if choice.holds > 1:
-        return replace(choice, error=max(_errors(scenario, choice.holds)))
+        return replace(choice, error=_Excerpts(scenario).error(choice.holds))
     if scenario.turntable.step != "auto" or scenario.turntable.mode not in _LEAPS:
         return choice
+    excerpts = _Excerpts(scenario)
     for holds in range(2, _MOST_HOLDS + 1):
         try:
-            error = max(_errors(scenario, holds))
+            error = excerpts.error(holds)
         except (ScenarioError, RunError):
             break  # a mode is too fast for this step
         if error >= TRUTH_ERROR / _MARGIN:
@@ -154,22 +153,32 @@ def given_step(parameters: TurntableParameters) -> StepChoice:
     return StepChoice(holds, substeps)
 
 
-def _errors(scenario: Scenario, holds: int) -> Iterator[float]:
-    """Yield the error of a step on each excerpt."""
-    starts, scale = _hardest(scenario)
-    n_time = min(_EXCERPT, scenario.n_time)
-    for start in sorted({min(max(k - n_time // 2, 0), scenario.n_time - n_time) for k in starts}):
-        base, long = (_play(scenario, start, n_time, m) for m in (1, holds))
-        change = max(float(np.max(np.abs(a - b))) for a, b in zip(_rates(base), _rates(long), strict=True))
-        yield change / max(scale, _LEAST_RATE)
+class _Excerpts:
+    """The hardest parts of a scenario, played with the base step, to compare longer steps with."""
 
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._n_time = min(_EXCERPT, scenario.n_time)
+        places, self._scale = _hardest(scenario)
+        last = scenario.n_time - self._n_time
+        starts = sorted({min(max(k - self._n_time // 2, 0), last) for k in places})
+        self._base = {start: self._play(start, 1) for start in starts}
 
-def _play(scenario: Scenario, start: int, n_time: int, holds: int) -> TruthBlock:
-    mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-    table = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, holds=holds)
-    motion = excerpt(scenario, start, _RAMP_IN)
-    command = motion.process(n_time)
-    return table.process(command, motion.peek(table.lookahead))
+    def error(self, holds: int) -> float:
+        """Return the largest change of a true rate by steps of `holds` base steps, over the largest rate."""
+        changes = [
+            float(np.max(np.abs(a - b)))
+            for start, base in self._base.items()
+            for a, b in zip(_rates(base), _rates(self._play(start, holds)), strict=True)
+        ]
+        return max(changes) / max(self._scale, _LEAST_RATE)
+
+    def _play(self, start: int, holds: int) -> TruthBlock:
+        mountings = {name: sensor.mounting for name, sensor in self._scenario.sensors.items()}
+        table = Turntable(self._scenario.turntable, mountings, BASE_RATE_HZ, holds=holds)
+        motion = excerpt(self._scenario, start, _RAMP_IN)
+        command = motion.process(self._n_time)
+        return table.process(command, motion.peek(table.lookahead))
 
 
 def _rates(truth: TruthBlock) -> tuple[FloatArray, ...]:
