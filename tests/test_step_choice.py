@@ -109,3 +109,18 @@ def test_step_error_and_factor_are_printed_and_in_the_metrics(tmp_path, capsys):
     assert entry["step_factor"] == 3.0
     assert entry["step_error"] == choose_step(scenario).error
     assert scenario.resolved()["turntable"]["step"] == "auto"
+
+
+def test_look_ahead_beyond_the_end_of_a_record_keeps_the_promise(tmp_path):
+    """The record ends with the run: what the last steps see of the time behind it is its spline, carried on."""
+    t = np.linspace(0.0, 0.5, 251)
+    rows = [f"{a!r},{b!r}" for a, b in zip(t.tolist(), np.sin(2 * np.pi * 7.0 * t).tolist(), strict=True)]
+    (tmp_path / "record.csv").write_text("\n".join(["t,w", *rows]))
+    record = (
+        "recorded: {file: record.csv, time: {column: t, unit: s}, rate: {column: w, unit: deg/s}}",
+        "sine: {frequency: 10 Hz, rate: 1 deg/s}",
+    )
+    scenario = short(tmp_path, AUTO, record[::-1])
+    assert choose_step(scenario).holds > 1
+    base, long = truth_of(with_step(scenario, 5e-5)), truth_of(scenario)
+    assert np.abs(base - long).max() < TRUTH_ERROR * np.abs(base).max()
