@@ -11,6 +11,7 @@ from testbed.metrics import METRICS
 from testbed.models.servo import required_torque
 from testbed.models.table_modes import check_modes
 from testbed.scenario import BASE_RATE_HZ, Scenario
+from testbed.step_choice import given_step
 
 if TYPE_CHECKING:
     from testbed.document import Document
@@ -67,11 +68,21 @@ def _check_clocks(scenario: Scenario, document: Document) -> None:
 
 
 def _check_plant(scenario: Scenario, document: Document) -> None:
-    if scenario.turntable.mode == "servo":
+    parameters = scenario.turntable
+    try:
+        given_step(parameters)
+    except ScenarioError as error:
+        document.find(("turntable", "step"), _reasons(error))
+        return
+    if parameters.mode == "servo":
         try:
-            check_modes(scenario.turntable, 1.0 / BASE_RATE_HZ)
+            check_modes(parameters, 1.0 / BASE_RATE_HZ if parameters.step == "auto" else float(parameters.step))
         except ScenarioError as error:
-            document.find(("turntable",), "; ".join(problem.message for problem in error.problems))
+            document.find(("turntable",), _reasons(error))
+
+
+def _reasons(error: ScenarioError) -> str:
+    return "; ".join(problem.message for problem in error.problems)
 
 
 def _check_expectations(scenario: Scenario, document: Document) -> None:
@@ -137,10 +148,10 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
 
 def command_peaks(scenario: Scenario) -> tuple[float, float]:
     """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
-    profile = scenario.profile()
+    motion = scenario.profile()
     peak_rate = peak_torque = 0.0
     for start in range(0, scenario.n_time, _BLOCK):
-        command = profile.process(min(_BLOCK, scenario.n_time - start))
+        command = motion.process(min(_BLOCK, scenario.n_time - start))
         torque = required_torque(scenario.turntable, command, BASE_RATE_HZ)
         peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
         peak_torque = max(peak_torque, float(np.max(np.abs(torque))))

@@ -62,9 +62,11 @@ def run(
 def check(scenario: ScenarioFile) -> None:
     """Validate a scenario and print what was understood."""
     from testbed.loader import load_scenario
+    from testbed.table_facts import table_facts
     from testbed.terminal import print_scenario
 
-    print_scenario(load_scenario(scenario))
+    loaded = load_scenario(scenario)
+    print_scenario(loaded, table_facts(loaded))
 
 
 @app.command("list")

@@ -8,6 +8,7 @@ import numpy as np
 
 from testbed.metrics import ErrorMetrics, floor_density, floor_rmse
 from testbed.results import first_due
+from testbed.table_facts import TableMetrics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Judge:
-    """Accumulates the metrics of every sensor and filter after `settle`.
+    """Accumulates the metrics of the turntable and of every sensor and filter after `settle`.
 
     Parameters
     ----------
@@ -33,9 +34,11 @@ class Judge:
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
         self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
         self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        self._table = TableMetrics(scenario, chain.step)
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
+        self._table.write(block)
         for name, readings in block.sensors.items():
             self._add(name, block, readings, None)
         for name, estimate in block.fusion.items():
@@ -71,6 +74,7 @@ class Judge:
             "duration_s": frame.duration,
             "settle_s": frame.settle,
             "bandwidth_hz": frame.bandwidth,
+            "turntable": self._table.result(),
             "sensors": sensors,
             "fusion": fusion,
             "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),

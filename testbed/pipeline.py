@@ -11,6 +11,7 @@ from testbed.errors import RunError
 from testbed.models.turntable import Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings
+from testbed.step_choice import choose_step
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -67,9 +68,15 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion = scenario.profile()
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        exposed = [name for name, sensor in scenario.sensors.items() if sensor.exposed]
+        self.step = choose_step(scenario)
         self.turntable = Turntable(
-            scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE, exposed=exposed
+            scenario.turntable,
+            mountings,
+            BASE_RATE_HZ,
+            substeps=self.step.substeps,
+            holds=self.step.holds,
+            pose_stride=POSE_STRIDE,
+            exposed=[name for name, sensor in scenario.sensors.items() if sensor.exposed],
         )
         self._temperature = scenario.frame.temperature
         self._sensors = {
@@ -88,7 +95,7 @@ class Chain:
     def process(self, n_time: int) -> RunBlock:
         """Advance everything by `n_time` base samples."""
         command = self._motion.process(n_time)
-        truth = self.turntable.process(command)
+        truth = self.turntable.process(command, self._motion.peek(self.turntable.lookahead))
         readings, profiles = {}, {}
         for name, stage in self._sensors.items():
             readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start, self._around(name, truth))

@@ -129,14 +129,20 @@ class Scenario:
         start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + 2.0)
         return start, min(stop, self.frame.duration)
 
-    def profile(self) -> MotionProfile:
-        """Return the commanded motion from its start; ScenarioError if a recorded one cannot be read."""
+    def profile(self, ramp_in: float | None = None) -> MotionProfile:
+        """Return the commanded motion from its start; ScenarioError if a recorded one cannot be read.
+
+        Parameters
+        ----------
+        ramp_in : float, optional
+            Length of the ramp-in instead of the scenario's [s].
+        """
         seed, duration = self.frame.seed, self.frame.duration
         terms = [
             motion.start(duration, random_stream(seed, "motion", str(i), kind))
             for i, (kind, motion) in enumerate(self.motion)
         ]
-        return MotionProfile(terms, self.frame.ramp_in, BASE_RATE_HZ)
+        return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, BASE_RATE_HZ)
 
     def with_seed(self, seed: int) -> Scenario:
         """Return the same scenario under another seed."""

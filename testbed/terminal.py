@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from testbed.allan_report import Analysis, Term
     from testbed.scenario import Scenario
+    from testbed.table_facts import TableFacts
 
 _PLAIN_EVERY = 5.0
 
@@ -107,12 +109,42 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     for name, row in metrics["sensors"].items():
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
+    _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
         console.print(
             f"expected {bound['subject']} {bound['metric']} {bound['bound']}: {_number(bound['value'])} {verdict}"
         )
     console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+
+
+def _print_table(console: Console, table: Mapping[str, Any]) -> None:
+    """Print how the turntable did."""
+    followed = ", ".join(
+        f"{name} {_number(table[f'command_to_{name}_rms_deg_s'])} deg/s rms{_gain(table[f'command_to_{name}_lines'])}"
+        for name in ("encoder", "inertial")
+    )
+    torque = f"peak torque {_number(table['peak_torque_nm'])} N m"
+    if table["torque_limit_nm"] is not None:
+        torque += f" of {_number(table['torque_limit_nm'])} N m, margin {100 * table['torque_margin']:.0f} %"
+    noise = f"arithmetic noise of the truth {_number(table['truth_noise_deg_s'])} deg/s"
+    step = _step(table["step_s"], table["step_factor"], table["step_error"])
+    console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True, highlight=False)
+
+
+def _step(step: float, factor: float, error: float | None) -> str:
+    measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
+    return f"integration step {1e6 * step:g} us, {factor:g} times the hold{measured}"
+
+
+def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Return the line that is followed worst, in words."""
+    known = [line for line in lines if line["gain"] is not None]
+    if not known:
+        return ""
+    worst = max(known, key=lambda line: abs(line["gain"] - 1.0))
+    change = f"{100 * (worst['gain'] - 1.0):+.2g} %, {worst['phase_deg']:+.2g} deg"
+    return f" ({change} at {_number(worst['frequency_hz'])} Hz)"
 
 
 def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
@@ -126,8 +158,8 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
     return cells
 
 
-def print_scenario(scenario: Scenario) -> None:
-    """Print every key of a scenario: as written, and in SI."""
+def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
+    """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = _console()
     written = {key: f"{_plain_list(value)} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
         _leaves(dict(scenario.source))
@@ -145,11 +177,25 @@ def print_scenario(scenario: Scenario) -> None:
             for row in rows:
                 sheet.add_row(*row)
             console.print(sheet)
+    _print_facts(console, facts)
     console.print("The scenario is valid.")
 
 
 def _plain_list(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _print_facts(console: Console, facts: TableFacts) -> None:
+    modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
+    torque = f"required torque {facts.required_torque:.4g} N m"
+    if facts.torque_limit is not None:
+        used = facts.required_torque / facts.torque_limit
+        torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
+    noise = f"arithmetic noise of the truth {_number(math.degrees(facts.truth_noise))} deg/s rms"
+    step = _step(facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
+        if line:
+            console.print(f"turntable: {line}", soft_wrap=True, highlight=False)
 
 
 def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

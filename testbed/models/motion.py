@@ -125,17 +125,21 @@ class MotionProfile:
 
     def process(self, n_time: int) -> CommandBlock:
         """Return the next `n_time` steps."""
+        block = self.peek(n_time)
+        self._start += n_time
+        self._angle = float(block.angle[-1])
+        return block
+
+    def peek(self, n_time: int) -> CommandBlock:
+        """Return the next `n_time` steps and stay before them."""
         h = 1.0 / self._sample_rate_hz
         half_steps = self.rate(sample_times(2 * self._start, 2 * n_time + 1, 2.0 * self._sample_rate_hz))
         w0, wm, w1 = half_steps[:-1:2], half_steps[1::2], half_steps[2::2]
         angle = np.cumsum(np.concatenate([[self._angle], (w0 + 4.0 * wm + w1) * (h / 6.0)]))
-        block = CommandBlock(
+        return CommandBlock(
             start=self._start,
             rate=half_steps[::2].copy(),
             angle=angle,
             rate_mid=wm.copy(),
             angle_mid=angle[:-1] + (5.0 * w0 + 8.0 * wm - w1) * (h / 24.0),
         )
-        self._start += n_time
-        self._angle = float(angle[-1])
-        return block

@@ -48,6 +48,30 @@ def feed_forward(parameters: TurntableParameters, command: CommandBlock, dt: flo
     return torque
 
 
+def motor_torque(
+    parameters: TurntableParameters, reference: FloatArray, angle: FloatArray, rate: FloatArray
+) -> FloatArray:
+    """Return the torque of the motor in mode `servo`, before its limit.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Gains.
+    reference : ndarray, shape (n_time, 3)
+        Angle [rad], rate [rad/s] and feed-forward torque [N m] that are held.
+    angle, rate : ndarray, shape (n_time,)
+        Of the spindle [rad], [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (n_time,)
+        Torque [N m].
+    """
+    kp, kv = gains(parameters)
+    torque: FloatArray = kp * (reference[:, 0] - angle) + kv * (reference[:, 1] - rate) + reference[:, 2]
+    return torque
+
+
 def exact_torque(inertia: float, drag: float, rate: FloatArray, dt: float) -> FloatArray:
     r"""Return the held torque that takes a hinge exactly from each rate to the next (zero-order-hold inverse).
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
 from testbed.errors import RunError
-from testbed.models import plant, servo, table_modes
+from testbed.models import plant, servo, stepping, table_modes
 from testbed.models.engine import Engine
 from testbed.models.servo import required_torque
 from testbed.models.turntable_parameters import Cogging, Mounting, TurntableParameters
@@ -78,6 +78,8 @@ class Turntable:
         Base clock [Hz]: commands are held over its steps.
     substeps : int, optional
         Integration steps per step of the base clock, with the same held commands.
+    holds : int, optional
+        Steps of the base clock per integration step; then `process` needs a look ahead over `lookahead` steps.
     pose_stride : int, optional
         Steps between two poses.
     exposed : collection of str, optional
@@ -96,28 +98,33 @@ class Turntable:
         sample_rate_hz: float = 20000.0,
         *,
         substeps: int = 1,
+        holds: int = 1,
         pose_stride: int = 400,
         exposed: Collection[str] = (),
     ) -> None:
         self.parameters = parameters
         self._dt = 1.0 / sample_rate_hz
         if parameters.mode == "servo":
-            table_modes.check_modes(parameters, self._dt / substeps)
-        self.model = plant.build(parameters, mountings, self._dt / substeps, exposed)
+            table_modes.check_modes(parameters, self._dt * holds / substeps)
+        self.model = plant.build(parameters, mountings, self._dt * holds / substeps, exposed)
         self._data = mujoco.MjData(self.model)
         self._motor = int(self.model.actuator_ctrladr[self.model.actuator(plant.MOTOR).id])
         self._mountings, self._names, self._exposed = dict(mountings), tuple(mountings), tuple(exposed)
-        self._substeps, self._stride = substeps, pose_stride
+        self._substeps, self._holds, self._stride = substeps, holds, pose_stride
+        self.lookahead = stepping.lookahead(holds) if parameters.mode != "fixed" else 0
         self._next: int | None = None
         self._engine: Engine | None = None
+        self._long: stepping.LongSteps | None = None
 
-    def process(self, command: CommandBlock) -> TruthBlock:
+    def process(self, command: CommandBlock, ahead: CommandBlock | None = None) -> TruthBlock:
         """Follow the command over its steps.
 
         Parameters
         ----------
         command : CommandBlock
             The steps after those of the call before [rad/s, rad].
+        ahead : CommandBlock, optional
+            The `lookahead` steps behind them, for integration steps of several holds.
 
         Returns
         -------
@@ -136,12 +143,35 @@ class Turntable:
             raise ValueError(msg)
         self._check_finite(command)
         self._next = command.start + command.n_time
-        return self._fixed(command) if self.parameters.mode == "fixed" else self._simulate(command)
+        if self.parameters.mode == "fixed":
+            return self._fixed(command)
+        return self._truth(command, self._simulate(command) if self._holds == 1 else self._leap(command, ahead))
 
-    def _simulate(self, command: CommandBlock) -> TruthBlock:
+    def _simulate(self, command: CommandBlock) -> FloatArray:
         if self._engine is None:
             self._engine = self._start(command)
-        rows = self._engine.advance(command.start, self._control(command))
+        return self._engine.advance(command.start, self._control(command))
+
+    def _leap(self, command: CommandBlock, ahead: CommandBlock | None) -> FloatArray:
+        """Return the sensor rows of integration steps that span several holds."""
+        if ahead is None or ahead.n_time != self.lookahead:
+            msg = f"ahead: expected {self.lookahead} steps behind the block, got {ahead and ahead.n_time}"
+            raise ValueError(msg)
+        held = self._control(command)
+        control = np.concatenate([held, self._control(ahead)])
+        if self._long is None:
+            self._long = self._start_long(command, control)
+        rows = self._long.advance(command.start, command.n_time, control)
+        # The torque follows the held references also within a step.
+        entry = self.model.sensor("torque").adr[0]
+        rows[:, entry] = held[:, self._motor]
+        if self.parameters.mode != "ideal":
+            q, v = self._column(f"q_{plant.SPINDLE}", rows), self._column("encoder_rate", rows)
+            reference = held[:, self._motor : self._motor + 3]
+            rows[:, entry] = servo.motor_torque(self.parameters, reference, q, v)
+        return rows
+
+    def _truth(self, command: CommandBlock, rows: FloatArray) -> TruthBlock:
         self._check_motor(command.start, self._column("torque", rows))
         angles = rows[:, : self.model.nq]
         yaw = self._column("q_platform_rz", rows) if self.parameters.mode == "servo" else 0.0
@@ -188,7 +218,19 @@ class Turntable:
         turned: FloatArray = (to_table.T[:, :, None] * np.array(force)).sum(axis=1).T
         return rate[:, None] * to_table[2, :2], turned
 
+    def _start_long(self, command: CommandBlock, control: FloatArray) -> stepping.LongSteps:
+        data, qvel = self._at_start(command)
+        acceleration, sensed = stepping.responses(self.model, data)
+        qvel += stepping.LongSteps.initial(acceleration, control, self._holds, self._dt)
+        engine = Engine(self.model, data.qpos, qvel, self._substeps)
+        return stepping.LongSteps(engine, sensed, self._holds, self._dt)
+
     def _start(self, command: CommandBlock) -> Engine:
+        data, qvel = self._at_start(command)
+        return Engine(self.model, data.qpos, qvel, self._substeps)
+
+    def _at_start(self, command: CommandBlock) -> tuple[Any, FloatArray]:
+        """Return the table in its equilibrium at the commanded angle, and its first velocities."""
         data, parameters = mujoco.MjData(self.model), self.parameters
         spindle = self.model.joint(plant.SPINDLE).qposadr[0]
         data.qpos[spindle] = command.angle[0]
@@ -197,7 +239,7 @@ class Turntable:
             table_modes.settle(self.model, data)
         qvel = np.zeros(self.model.nv)
         qvel[spindle] = command.rate[0]
-        return Engine(self.model, data.qpos, qvel, self._substeps)
+        return data, qvel
 
     def _control(self, command: CommandBlock) -> FloatArray:
         control = np.zeros((command.n_time, self.model.nu))

@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
 from testbed.parts import Part
 from testbed.units import Angle, AngularDrag, Frequency, Inertia, Length, Mass, Position, Quantity, Torque
 
+if TYPE_CHECKING:
+    from pydantic import ValidationInfo
+
+
+@dataclass(frozen=True)
+class AutoQuantity(Quantity):
+    """A quantity, or the word auto."""
+
+    def validate(self, value: Any, info: ValidationInfo) -> Any:
+        """Return the SI float of `value`, or auto."""
+        return value if value == "auto" else super().validate(value, info)
+
+    def _write(self, value: Any, info: Any) -> Any:
+        return value if value == "auto" else super()._write(value, info)
+
+
+Step = Annotated[float | Literal["auto"], AutoQuantity("s", "50 us", above=0.0)]
 PositiveTorque = Annotated[float, Quantity("N*m", "6 N*m", above=0.0)]
 Acceleration = Annotated[float, Quantity("m/s^2", "9.80665 m/s^2", at_least=0.0)]
 DampingRatio = Annotated[float, Field(gt=0.0, lt=1.0, allow_inf_nan=False)]
@@ -65,6 +83,9 @@ class TurntableParameters(Part):
     mode : {"servo", "ideal", "fixed"}
         `servo`: the full plant follows the command as its servo can. `ideal`: a single hinge under the exact inverse
         torque. `fixed`: no plant, the truth is the command.
+    step : float or "auto"
+        Integration step [s]; a whole part or multiple of the 50 us over which references are held, or `auto`: as long
+        as the true rate stays within 1e-6 of its largest value, see `testbed.step_choice.choose_step`.
     gravity : float
         Acceleration of gravity [m/s^2].
     platform_mass : float
@@ -111,6 +132,7 @@ class TurntableParameters(Part):
     """
 
     mode: Literal["servo", "ideal", "fixed"] = "servo"
+    step: Step = 5e-5
     gravity: Acceleration = 9.80665
     platform_mass: Mass = 400.0
     platform_inertia: Inertias = (24.0, 24.0, 45.0)

@@ -73,6 +73,7 @@ class RunMetrics(_Metrics):
     versions: dict[str, Any] = {}
     sensors: dict[str, SourceMetrics]
     fusion: dict[str, SourceMetrics]
+    turntable: SourceMetrics | None = None
     expectations: list[Expectation] = []
     floor_density: FloorDensity | None = None
 

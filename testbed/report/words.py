@@ -110,7 +110,8 @@ def _expectations(metrics: RunMetrics) -> str:
 def further(metrics: RunMetrics) -> dict[str, dict[str, Any]]:
     """Return the numbers of ``metrics.json`` that the tables do not show, by source."""
     found = {}
-    for name, source in {**metrics.sensors, **metrics.fusion}.items():
+    table = {} if metrics.turntable is None else {"turntable": metrics.turntable}
+    for name, source in {**table, **metrics.sensors, **metrics.fusion}.items():
         extra = source.model_extra or {}
         numbers = {
             key: value for key, value in extra.items() if isinstance(value, int | float) and not isinstance(value, bool)
