@@ -10,7 +10,7 @@ from testbed.errors import ScenarioError
 from testbed.metrics import METRICS
 from testbed.models.motion import MotionProfile
 from testbed.models.servo import required_torque
-from testbed.models.table_modes import check_modes
+from testbed.models.turntable import check_plant
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.signals import random_stream
 
@@ -69,11 +69,10 @@ def _check_clocks(scenario: Scenario, document: Document) -> None:
 
 
 def _check_plant(scenario: Scenario, document: Document) -> None:
-    if scenario.turntable.mode == "servo":
-        try:
-            check_modes(scenario.turntable, 1.0 / BASE_RATE_HZ)
-        except ScenarioError as error:
-            document.find(("turntable",), "; ".join(problem.message for problem in error.problems))
+    try:
+        check_plant(scenario.turntable, BASE_RATE_HZ)
+    except ScenarioError as error:
+        document.find(("turntable",), "; ".join(problem.message for problem in error.problems))
 
 
 def _check_expectations(scenario: Scenario, document: Document) -> None:
@@ -130,7 +129,7 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
                 f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, +-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
             )
     limit = scenario.turntable.torque_limit
-    if scenario.turntable.mode == "servo" and peak_torque > limit:
+    if scenario.turntable.has_plant and peak_torque > limit:
         document.find(
             ("motion",),
             f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'ideal'",

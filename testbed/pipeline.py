@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +72,8 @@ class Chain:
         ]
         self._motion = MotionProfile(terms, frame.ramp_in, BASE_RATE_HZ)
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        self.turntable = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE)
+        floor = scenario.turntable.floor.start(frame.duration, partial(random_stream, frame.seed, "turntable", "floor"))
+        self.turntable = Turntable(scenario.turntable, mountings, BASE_RATE_HZ, pose_stride=POSE_STRIDE, floor=floor)
         self._sensors = {
             name: sensor.start(BASE_RATE_HZ, frame.seed, name) for name, sensor in scenario.sensors.items()
         }

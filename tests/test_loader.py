@@ -98,7 +98,7 @@ def test_load_of_the_resolved_scenario_gives_the_same_run(tmp_path):
         ("name: good", "name: ../bad", 1, "name", "match pattern"),
         ("name: good\n", "", None, "name", "is required"),
         ("preset: air_bearing", "preset: air_bering", 5, "turntable.preset", "did you mean 'air_bearing'"),
-        ("{preset: air_bearing}", "{preset: air_bearing, mode: flying}", 5, "turntable.mode", "'servo', 'ideal' or 'fixed'"),
+        ("{preset: air_bearing}", "{preset: air_bearing, mode: flying}", 5, "turntable.mode", "'servo', 'digital', 'ideal' or 'fixed'"),
         ("{preset: air_bearing}", "{rotor_mass: -20 kg}", 5, "turntable.rotor_mass", "expected more than 0"),
         ("frequency: 0.5 Hz", "frequency: 0.5 rad/s", 7, "motion.0.sine.frequency", "wrong dimension"),
         ("angle: 5.555 mrad", "angel: 5.555 mrad", 7, "motion.0.sine.angel", "did you mean 'angle'"),

@@ -10,6 +10,8 @@ import numpy as np
 
 from testbed.errors import RunError
 from testbed.models import plant, servo, table_modes
+from testbed.models.digital import DigitalLoop, check_loop
+from testbed.models.disturbances import Disturbances, check_floor
 from testbed.models.engine import Engine
 from testbed.models.servo import required_torque
 from testbed.models.turntable_parameters import Cogging, Mounting, TurntableParameters
@@ -17,12 +19,13 @@ from testbed.models.turntable_parameters import Cogging, Mounting, TurntablePara
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.models.floor import FloorMotion
     from testbed.models.motion import CommandBlock
     from testbed.signals import FloatArray
 
     Poses = dict[str, tuple[FloatArray, FloatArray]]
 
-__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "required_torque"]
+__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,9 @@ class TruthBlock:
     start : int
         Index k of the first sample.
     rate : ndarray, shape (n_time,)
-        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor.
+        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor; with the Earth's if asked for.
     angle : ndarray, shape (n_time,)
-        Inertial angle about the vertical, spindle plus platform yaw, not wrapped [rad].
+        Angle about the vertical, spindle plus platform yaw, not wrapped [rad]; without the Earth's.
     sensor_rate : dict of str to ndarray, shape (n_time,)
         What each sensor's own axis feels [rad/s].
     encoder_rate : ndarray, shape (n_time,)
@@ -74,11 +77,15 @@ class Turntable:
         Integration steps per step of the base clock, with the same held commands.
     pose_stride : int, optional
         Steps between two poses.
+    floor : FloorMotion, optional
+        The realisation of `parameters.floor`; needed if that floor moves.
 
     Raises
     ------
     ScenarioError
-        If the plant cannot be built, falls over, or is too stiff for the step.
+        If the plant cannot be built, falls over, is too stiff for the step, or its digital servo is unstable.
+    ValueError
+        If the floor moves and `floor` is not given.
     """
 
     def __init__(
@@ -89,18 +96,23 @@ class Turntable:
         *,
         substeps: int = 1,
         pose_stride: int = 400,
+        floor: FloorMotion | None = None,
     ) -> None:
         self.parameters = parameters
         self._dt = 1.0 / sample_rate_hz
-        if parameters.mode == "servo":
-            table_modes.check_modes(parameters, self._dt / substeps)
+        check_plant(parameters, sample_rate_hz, substeps)
         self.model = plant.build(parameters, mountings, self._dt / substeps)
         self._data = mujoco.MjData(self.model)
         self._motor = int(self.model.actuator_ctrladr[self.model.actuator(plant.MOTOR).id])
         self._names = tuple(mountings)
         self._substeps, self._stride = substeps, pose_stride
         self._next: int | None = None
-        self._engine: Engine | None = None
+        self._engine: Engine | DigitalLoop | None = None
+        self._disturbances = (
+            Disturbances(self.model, parameters, floor, sample_rate_hz) if parameters.has_plant else None
+        )
+        # The axis of each site on the table at angle 0: what turns with it in mode `fixed`.
+        self._axes = {name: plant.rotation(self.model.site(name).quat)[:, 2] for name in (plant.AXIS, *mountings)}
 
     def process(self, command: CommandBlock) -> TruthBlock:
         """Follow the command over its steps.
@@ -132,15 +144,19 @@ class Turntable:
     def _simulate(self, command: CommandBlock) -> TruthBlock:
         if self._engine is None:
             self._engine = self._start(command)
-        rows = self._engine.advance(command.start, self._control(command))
+        control = self._control(command)
+        if isinstance(self._engine, DigitalLoop):
+            rows = self._engine.advance(command.start, control, command.angle[:-1])
+        else:
+            rows = self._engine.advance(command.start, control)
         self._check_motor(command.start, self._column("torque", rows))
         angles = rows[:, : self.model.nq]
-        yaw = self._column("q_platform_rz", rows) if self.parameters.mode == "servo" else 0.0
+        yaw = self._column("q_platform_rz", rows) if self.parameters.has_plant else 0.0
         return TruthBlock(
             start=command.start,
-            rate=self._column(f"rate_{plant.AXIS}", rows),
+            rate=self._rate(plant.AXIS, rows),
             angle=self._column(f"q_{plant.SPINDLE}", rows) + yaw,
-            sensor_rate={name: self._column(f"rate_{name}", rows) for name in self._names},
+            sensor_rate={name: self._rate(name, rows) for name in self._names},
             encoder_rate=self._column("encoder_rate", rows),
             torque=self._column("torque", rows),
             poses=self._poses(command.start, angles),
@@ -148,41 +164,68 @@ class Turntable:
 
     def _fixed(self, command: CommandBlock) -> TruthBlock:
         rate, angle = command.rate[:-1].copy(), command.angle[:-1].copy()
-        # A rate about the vertical, seen along a tilted axis: the last element of the site's rotation.
-        projection = {name: float(plant.rotation(self.model.site(name).quat)[2, 2]) for name in self._names}
-        sensor_rate = {name: factor * rate for name, factor in projection.items()}
+        # A rate about the vertical, seen along a tilted axis.
+        felt = {name: axis[2] * rate + self._earth(_turned(axis, angle)) for name, axis in self._axes.items()}
         return TruthBlock(
             start=command.start,
-            rate=rate,
+            rate=felt.pop(plant.AXIS),
             angle=angle,
-            sensor_rate=sensor_rate,
-            encoder_rate=rate.copy(),
+            sensor_rate=felt,
+            encoder_rate=rate,
             torque=np.zeros(command.n_time),
             poses=self._poses(command.start, angle[:, None]),
         )
 
-    def _start(self, command: CommandBlock) -> Engine:
-        data, parameters = mujoco.MjData(self.model), self.parameters
-        spindle = self.model.joint(plant.SPINDLE).qposadr[0]
-        data.qpos[spindle] = command.angle[0]
-        if parameters.mode == "servo":
-            data.ctrl[self._motor] = command.angle[0]
-            table_modes.settle(self.model, data)
+    def _start(self, command: CommandBlock) -> Engine | DigitalLoop:
+        parameters, angle = self.parameters, command.angle[0]
+        # The analogue servo holds the table at rest, so that its equilibrium is one of springs alone.
+        analogue = parameters.model_copy(update={"mode": "servo"})
+        rest = plant.build(analogue, {}, self._dt) if parameters.mode == "digital" else self.model
+        data = mujoco.MjData(rest)
+        spindle = rest.joint(plant.SPINDLE).qposadr[0]
+        data.qpos[spindle] = angle
+        if self._disturbances is not None:
+            data.ctrl[rest.actuator_ctrladr[rest.actuator(plant.MOTOR).id]] = angle
+            self._disturbances.at_start(data.ctrl, angle)
+            table_modes.settle(rest, data)
         qvel = np.zeros(self.model.nv)
         qvel[spindle] = command.rate[0]
+        if parameters.mode == "digital":
+            return DigitalLoop(self.model, data.qpos, qvel, self._substeps, parameters)
         return Engine(self.model, data.qpos, qvel, self._substeps)
 
     def _control(self, command: CommandBlock) -> FloatArray:
         control = np.zeros((command.n_time, self.model.nu))
         parameters = self.parameters
         if parameters.mode == "ideal":
-            drag = parameters.spindle_drag
-            control[:, self._motor] = servo.exact_torque(parameters.spindle_inertia, drag, command.rate, self._dt)
+            control[:, self._motor] = servo.exact_torque(parameters, command.rate, self._dt)
+        elif parameters.mode == "digital":
+            control[:, self._motor] = servo.feed_forward(parameters, command, self._dt)
         else:
             control[:, self._motor] = command.angle_mid
             control[:, self._motor + 1] = command.rate_mid
             control[:, self._motor + 2] = servo.feed_forward(parameters, command, self._dt)
+        if self._disturbances is not None:
+            self._disturbances.apply(control, command.start, command.angle_mid, command.rate_mid)
         return control
+
+    def _rate(self, site: str, rows: FloatArray) -> FloatArray:
+        """Return the inertial rate about the z axis of a site, the Earth's included where it is asked for."""
+        rate = self._column(f"rate_{site}", rows)
+        if self.parameters.earth_rate is None:
+            return rate
+        first = self.model.sensor(f"axis_{site}").adr[0]
+        return rate + self._earth(rows[:, first : first + 3].T)
+
+    def _earth(self, axis: FloatArray) -> FloatArray | float:
+        """Return the Earth's rate along an axis, shape (3, n_time); MuJoCo's laboratory does not turn."""
+        earth = self.parameters.earth_rate
+        if earth is None:
+            return 0.0
+        x, y, z = earth.vector
+        # No matrix product: its order of additions depends on the length of the block.
+        rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+        return rate
 
     def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
         """Return the last component of a sensor: the value of a scalar, the z of an angular velocity."""
@@ -216,3 +259,35 @@ class Turntable:
             t = (start + int(np.argmax(saturated))) * self._dt
             msg = f"turntable: the motor saturated at its {limit:g} N*m at t = {t:.6g} s; the run got this far"
             raise RunError(msg)
+
+
+def check_plant(parameters: TurntableParameters, sample_rate_hz: float, substeps: int = 1) -> None:
+    """Refuse a table that cannot be run: unstable, too stiff for the step, or faster than the clock.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Of the plant; modes without one are always accepted.
+    sample_rate_hz : float
+        Base clock [Hz].
+    substeps : int, optional
+        Integration steps per step of the base clock.
+
+    Raises
+    ------
+    ScenarioError
+        Saying what was expected.
+    """
+    if not parameters.has_plant:
+        return
+    table_modes.check_modes(parameters, 1.0 / sample_rate_hz / substeps)
+    check_floor(parameters, sample_rate_hz)
+    if parameters.mode == "digital":
+        check_loop(parameters, sample_rate_hz)
+
+
+def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return an axis, shape (3,), turned about the vertical by angles, shape (n_time,); shape (3, n_time)."""
+    x, y, z = axis
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y, np.full_like(c, z)])

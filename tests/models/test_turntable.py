@@ -23,6 +23,7 @@ SENSORS = {
     "mems_gyro": Mounting(position=(0.0, 0.0, 0.05), misalignment=(0.02, -0.03)),
 }
 CALM = TurntableParameters(cogging=())
+MODES = ["servo", "digital", "ideal", "fixed"]
 
 
 def command(freq_hz: float, amplitude: float, n_time: int, ramp_in: float = 0.05) -> CommandBlock:
@@ -73,10 +74,11 @@ def test_ideal_follows_the_command_exactly(freq_hz: float) -> None:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("drag", [0.0, 0.5])
-def test_ideal_follows_random_rate_at_any_drag(drag: float) -> None:
+@pytest.mark.parametrize(("drag", "windage"), [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (5e-4, 0.1)])
+def test_ideal_follows_random_rate_at_any_drag(drag: float, windage: float) -> None:
     block = random_command(4000)
-    truth = Turntable(TurntableParameters(mode="ideal", spindle_drag=drag), SENSORS).process(block)
+    parameters = TurntableParameters(mode="ideal", spindle_drag=drag, spindle_windage=windage)
+    truth = Turntable(parameters, SENSORS).process(block)
     assert np.abs(truth.rate - block.rate[:-1]).max() < 1e-10 * np.abs(block.rate).max()
 
 
@@ -95,7 +97,7 @@ def test_fixed_at_rest_is_exactly_zero() -> None:
     assert not any(value.any() for value in columns(truth).values())
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 def test_misaligned_sensor_feels_the_projection(mode: str) -> None:
     a, b = SENSORS["mems_gyro"].misalignment
     truth = Turntable(CALM.model_copy(update={"mode": mode}), SENSORS).process(command(20.0, DEG, 2000))
@@ -235,7 +237,7 @@ def test_inertial_angle_is_the_integral_of_the_inertial_rate() -> None:
     assert np.ptp(truth.angle) * 1e-3 > 10 * bound  # so the recoil, which the spindle alone would miss, is seen
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 def test_angle_is_not_wrapped(mode: str) -> None:
     truth = Turntable(TurntableParameters(mode=mode), SENSORS).process(constant(40.0, 6000))
     expected = 40.0 * np.arange(6000) * DT
@@ -266,7 +268,7 @@ def test_static_table_stays_still_at_another_angle() -> None:
 # ---------------------------------------------------------------- blocks and poses
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("cuts", [(0, 3000), (0, 1, 2, 1000, 2999, 3000), (0, 400, 800, 3000), (0, 0, 399, 1201, 3000)])
 def test_any_division_into_blocks_gives_the_same_bits(mode: str, cuts: tuple[int, ...]) -> None:
     parameters = TurntableParameters(mode=mode, rotor_com=(1e-4, 0.0, 0.05))
@@ -282,7 +284,7 @@ def test_any_division_into_blocks_gives_the_same_bits(mode: str, cuts: tuple[int
             np.testing.assert_array_equal(np.concatenate([part.poses[body][i] for part in parts]), poses[i])
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 def test_poses_are_those_of_the_model_at_the_pose_samples(mode: str) -> None:
     block = command(2.0, 60 * DEG, 3000)
     table = Turntable(TurntableParameters(mode=mode), SENSORS, pose_stride=100)
@@ -311,7 +313,7 @@ def test_process_refuses_a_block_that_does_not_follow() -> None:
 # ---------------------------------------------------------------- failures
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_nan_command_raises_and_names_the_time(mode: str, value: float) -> None:
     block = command(10.0, DEG, 1000)
@@ -379,11 +381,11 @@ def test_required_torque_bounds_what_the_motor_gives() -> None:
     assert np.abs(torque).max() > 0.98 * needed.max()  # the cogging is only 0.7 % of it
 
 
-@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+@pytest.mark.parametrize("mode", MODES)
 def test_model_is_there_for_drawing_in_every_mode(mode: str) -> None:
     model = Turntable(TurntableParameters(mode=mode), SENSORS).model
     assert isinstance(model, mujoco.MjModel)
-    assert model.nv == (12 if mode == "servo" else 1)
+    assert model.nv == (12 if mode in {"servo", "digital"} else 1)
     assert {model.body(i).name for i in range(model.nbody)} == {"world", "platform", "rotor"}
     assert {"mhd_ars", "mems_gyro"} <= {model.site(i).name for i in range(model.nsite)}
 
