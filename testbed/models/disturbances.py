@@ -70,7 +70,9 @@ class Disturbances:
         for column, place, _ in self._inputs(np.zeros(1), np.array([angle]), np.zeros(1)):
             control[column] += place[0]
 
-    def _inputs(self, t: FloatArray, angle: FloatArray, rate: FloatArray) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    def _inputs(
+        self, t: FloatArray, angle: FloatArray, rate: FloatArray
+    ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
         for axis, inputs in (self._floor.inputs(t) if self._floor else {}).items():
             yield self._column[f"platform_{axis}"], *inputs
         for one in self._wobble:

@@ -111,10 +111,10 @@ def hold_matrices(inertia: float, drag: float, dt: float) -> tuple[FloatArray, F
 def required_torque(parameters: TurntableParameters, command: CommandBlock, sample_rate_hz: float) -> FloatArray:
     r"""Return the motor torque that a motion needs at most in each step.
 
-    .. math:: |I a_k + (c + b |\Omega_{k+1/2}|) \Omega_{k+1/2}| + k_v |a_k| h / 2 + \sum_i A_i,
+    .. math:: |I a_k + (c + b |\Omega_{k+1/2}|) \Omega_{k+1/2}| + (k_v |a_k| + k_p |\Omega_{k+1/2}|) h / 2 + \sum_i A_i,
         \quad a_k = (\Omega_{k+1} - \Omega_k) / h
 
-    The second term (mode `servo`) is the rate loop, which sees the reference held at its value in mid-step while the
+    The second term (mode `servo`) is the servo, which sees its references held at their values in mid-step while the
     table moves on; A_i are the amplitudes of the cogging, whatever their phases. In mode `digital` the second term is
     k_v |a_k| (T - h) / 2 for a feed-forward held over the controller's period T, plus one count of the encoder through
     the loop, (k_p + k_v alpha / T) Delta, and the first is larger by the sum of the ripple. Transients of the servo and
@@ -140,11 +140,12 @@ def required_torque(parameters: TurntableParameters, command: CommandBlock, samp
     if not parameters.has_plant:
         return np.abs(motion)
     (kp, kv), digital = gains(parameters), parameters.digital
-    hold, count, ripple = 1.0 / sample_rate_hz, 0.0, 1.0
-    if parameters.mode == "digital":
-        hold = 1.0 / digital.controller_rate - hold
-        count = (kp + kv * digital.filter_gain * digital.controller_rate) * digital.resolution
-        ripple += sum(one.relative for one in digital.ripple)
-    staircase = kv * hold / 2 * np.abs(acceleration)
-    torque: FloatArray = ripple * np.abs(motion) + staircase + count
-    return torque + sum(harmonic.torque for harmonic in parameters.cogging)
+    half = 0.5 / sample_rate_hz
+    if parameters.mode == "servo":
+        loop = half * (kv * np.abs(acceleration) + kp * np.abs(command.rate_mid))
+    else:
+        motion *= 1.0 + sum(one.relative for one in digital.ripple)
+        loop = kv * (0.5 / digital.controller_rate - half) * np.abs(acceleration)
+        loop += (kp + kv * digital.filter_gain * digital.controller_rate) * digital.resolution
+    torque: FloatArray = np.abs(motion) + loop + sum(harmonic.torque for harmonic in parameters.cogging)
+    return torque

@@ -74,7 +74,11 @@ def test_preset_marks_every_value_with_its_source(name: str) -> None:
     text = (resources.files("testbed.models") / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
     lines = text.splitlines()
     for i, line in enumerate(lines):
-        if line and not line.startswith("#") and not line.lstrip().startswith(("mode:", "cogging:", "digital:", "ripple:")):
+        if (
+            line
+            and not line.startswith("#")
+            and not line.lstrip().startswith(("mode:", "cogging:", "digital:", "ripple:"))
+        ):
             assert any(word in line + lines[i - 1] for word in ("assumed", "derived", "standard gravity")), line
 
 
@@ -105,8 +109,14 @@ def test_preset_marks_every_value_with_its_source(name: str) -> None:
         ({"wobble": ({"axis": "rz", "angle": 1e-6, "periods": 1},)}, "'rx' or 'ry'"),
         ({"wobble": ({"axis": "rx", "angle": float("inf"), "periods": 1},)}, "expected a quantity in rad"),
         ({"wobble": ({"axis": "rx", "angle": 1e-6, "periods": 0},)}, "greater than or equal to 1"),
-        ({"mode": "ideal", "wobble": ({"axis": "rx", "angle": 1e-6, "periods": 1},)}, "wobble: expected mode 'servo' or"),
-        ({"mode": "fixed", "floor": {"lines": ({"axis": "x", "frequency": 1, "displacement": 1},)}}, "floor: expected mode"),
+        (
+            {"mode": "ideal", "wobble": ({"axis": "rx", "angle": 1e-6, "periods": 1},)},
+            "wobble: expected mode 'servo' or",
+        ),
+        (
+            {"mode": "fixed", "floor": {"lines": ({"axis": "x", "frequency": 1, "displacement": 1},)}},
+            "floor: expected mode",
+        ),
         ({"earth_rate": {"latitude": 2.0}}, "expected at most"),
         ({"earth_rate": {"azimuth": 2.0}}, "Field required"),
         ({"rotor_weight": 20.0}, "Extra inputs are not permitted"),
