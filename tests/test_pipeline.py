@@ -106,3 +106,16 @@ def test_a_run_without_sensors_or_filters_has_truth_only(tmp_path):
     assert run.truth.rate.size == 10_000
     assert not run.sensors
     assert not run.fusion
+
+
+FLOOR = "{floor: {bands: [{axis: rz, low: 2 Hz, high: 80 Hz, angular_acceleration_psd: 1e-6 (rad/s^2)^2/Hz}]}}"
+
+
+def test_the_seed_moves_the_floor_and_blocks_do_not(tmp_path):
+    scenario = short(tmp_path, ("{preset: air_bearing}", FLOOR))
+    first, parts = testbed.run(scenario).truth.rate, testbed.run(scenario, block=0.0371).truth.rate
+    other, quiet = testbed.run(scenario, seed=12).truth.rate, testbed.run(short(tmp_path)).truth.rate
+    assert np.array_equal(first, parts)
+    assert not np.array_equal(first, other)
+    assert np.std(first - quiet) == pytest.approx(np.std(other - quiet), rel=0.9)
+    assert 1e-6 < np.std(first - quiet) < 1e-3

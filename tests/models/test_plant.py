@@ -322,3 +322,9 @@ def test_engine_refuses_nan_control_and_names_its_time() -> None:
 def test_parameters_do_not_import_mujoco() -> None:
     code = "import sys, testbed.models.turntable_parameters; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_no_two_faces_of_shaft_and_disc_lie_in_one_plane() -> None:
+    model = plant.build(TurntableParameters(), {}, DT)
+    ends = [model.geom(name).pos[2] + side * model.geom(name).size[1] for name in ("shaft", "disc") for side in (-1, 1)]
+    assert np.diff(np.sort(ends)).min() > 1e-3

@@ -11,9 +11,12 @@ import pytest
 from scipy.linalg import expm
 
 from testbed.errors import RunError, ScenarioError
-from testbed.models import servo
+from testbed.models import plant, servo
+from testbed.models.earth import EarthRate
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import Mounting, TruthBlock, Turntable, TurntableParameters, required_torque
+from testbed.models.turntable_parameters import Digital, Wobble
+from testbed.parts import preset
 
 FS = 20000.0
 DT = 1.0 / FS
@@ -355,6 +358,106 @@ def test_substeps_make_room_for_a_stiffer_bearing() -> None:
         Turntable(stiff, SENSORS)
     truth = Turntable(stiff, SENSORS, substeps=4).process(command(10.0, DEG, 400))
     assert truth.rate.shape == (400,)
+
+
+# ---------------------------------------------------------------- presets
+
+
+def table_preset(name: str, **changes: object) -> TurntableParameters:
+    read = TurntableParameters.model_validate(preset("testbed.models", name), context={"border": True})
+    return read.model_copy(update=changes)
+
+
+@pytest.mark.parametrize("mode", ["servo", "digital"])
+def test_high_torque_table_passes_50_deg_s_at_60_hz(mode: str) -> None:
+    parameters = table_preset("air_bearing_high_torque", mode=mode)
+    block = command(60.0, 50 * DEG, 8000, ramp_in=0.1)
+    needed = required_torque(parameters, block, FS).max()
+    truth = Turntable(parameters, SENSORS).process(block)
+    torque = np.abs(truth.torque).max()
+    assert 19.7 < torque < needed < parameters.torque_limit  # I A w = 19.7 N m
+    late = slice(4000, None)  # four periods after the ramp
+    t = np.arange(8000)[late] * DT
+    basis = np.stack([np.sin(120 * np.pi * t), np.cos(120 * np.pi * t), t, np.ones_like(t)], axis=1)
+    amplitude = np.hypot(*np.linalg.lstsq(basis, truth.rate[late], rcond=None)[0][:2]) / (50 * DEG)
+    print(f"{mode}: {torque:.1f} N m of {parameters.torque_limit:g} N m, amplitude {100 * (amplitude - 1):+.3f} %")
+    # What misses is the recoil of the platform, I / I_platform = 0.13 %, of which the servo takes part back.
+    assert abs(amplitude - 1) < 2e-3
+
+
+def test_plain_table_does_not() -> None:
+    block = command(60.0, 50 * DEG, 4000, ramp_in=0.1)
+    assert required_torque(TurntableParameters(), block, FS).max() > 6.0
+    with pytest.raises(RunError, match=r"the motor saturated at its 6 N\*m"):
+        Turntable(TurntableParameters(), SENSORS).process(block)
+
+
+# ---------------------------------------------------------------- every parameter counts
+
+OTHER_VALUES = {
+    "gravity": 1.6,
+    "platform_mass": 380.0,
+    "platform_inertia": (25.0, 24.0, 46.0),
+    "platform_com_height": 0.06,
+    "isolation_frequency": (1.6, 1.5, 2.6, 2.1, 2.0, 1.9),
+    "isolation_damping": 0.07,
+    "bearing_height": 0.26,
+    "rotor_mass": 21.0,
+    "rotor_inertia": (0.071, 0.07, 0.051),
+    "rotor_com": (2e-4, 0.0, 0.05),
+    "radial_frequency": 380.0,
+    "axial_frequency": 480.0,
+    "tilt_frequency": 280.0,
+    "bearing_damping": 0.04,
+    "spindle_drag": 6e-4,
+    "spindle_windage": 1e-3,
+    "cogging": (),
+    "rate_bandwidth": 140.0,
+    "position_bandwidth": 14.0,
+    "feedforward_inertia_error": 0.01,
+    "feedforward_drag_error": 0.1,
+    "digital": Digital(encoder_bits=23),
+    "wobble": (Wobble(axis="ry", angle=1e-6, periods=2),),
+    "earth_rate": EarthRate(latitude=0.8),
+}
+# Shown elsewhere: the mode's own tests, the sensor's height in the picture, the motor's limit when it is reached.
+ELSEWHERE = {"mode", "mounting_height", "torque_limit", "floor"}
+
+
+def test_other_values_cover_every_parameter() -> None:
+    assert set(OTHER_VALUES) | ELSEWHERE == set(TurntableParameters.model_fields)
+
+
+@pytest.mark.parametrize("name", OTHER_VALUES)
+def test_every_parameter_changes_the_truth(name: str) -> None:
+    mountings = {"lateral": Mounting(misalignment=(0.3, 0.4))}
+    base = TurntableParameters(mode="digital", rotor_com=(1e-4, 0.0, 0.05))
+    block = command(20.0, DEG, 600, ramp_in=0.01)
+    other = base.model_copy(update={name: OTHER_VALUES[name]})
+    truths = [columns(Turntable(p, mountings, pose_stride=1).process(block))["lateral"] for p in (base, other)]
+    assert not np.array_equal(*truths)
+
+
+@pytest.mark.parametrize(
+    "digital", [{"controller_rate": 10e3}, {"velocity_filter": 500.0}, {"ripple": ()}, {"encoder_bits": 25}]
+)
+def test_every_parameter_of_the_digital_servo_changes_the_truth(digital: dict[str, object]) -> None:
+    block = command(20.0, DEG, 600, ramp_in=0.01)
+    rates = [
+        Turntable(TurntableParameters(mode="digital", digital=Digital(**one)), SENSORS).process(block).rate
+        for one in ({}, digital)
+    ]
+    assert not np.array_equal(*rates)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_lever_alone_changes_no_rate(mode: str) -> None:
+    # A rate is the same at every point of a rigid body.
+    mountings = {"centre": Mounting(), "rim": Mounting(position=(0.12, -0.05, 0.03))}
+    felt = Turntable(TurntableParameters(mode=mode), mountings).process(command(20.0, DEG, 1000)).sensor_rate
+    np.testing.assert_allclose(felt["rim"], felt["centre"], rtol=0.0, atol=1e-15 * DEG)
+    poses = plant.build(TurntableParameters(mode=mode), mountings, DT)
+    np.testing.assert_allclose(poses.site("rim").pos - poses.site("centre").pos, (0.12, -0.05, 0.03), atol=1e-15)
 
 
 # ---------------------------------------------------------------- torque and model
