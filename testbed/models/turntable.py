@@ -19,6 +19,7 @@ from testbed.models.turntable_parameters import Cogging, Mounting, TurntablePara
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.models.earth import EarthRate
     from testbed.models.floor import FloorMotion
     from testbed.models.motion import CommandBlock
     from testbed.signals import FloatArray
@@ -165,7 +166,10 @@ class Turntable:
     def _fixed(self, command: CommandBlock) -> TruthBlock:
         rate, angle = command.rate[:-1].copy(), command.angle[:-1].copy()
         # A rate about the vertical, seen along a tilted axis.
-        felt = {name: axis[2] * rate + self._earth(_turned(axis, angle)) for name, axis in self._axes.items()}
+        felt = {name: axis[2] * rate for name, axis in self._axes.items()}
+        if self.parameters.earth_rate is not None:
+            for name, axis in self._axes.items():
+                felt[name] += _along(self.parameters.earth_rate, _turned(axis, angle))
         return TruthBlock(
             start=command.start,
             rate=felt.pop(plant.AXIS),
@@ -212,19 +216,9 @@ class Turntable:
     def _rate(self, site: str, rows: FloatArray) -> FloatArray:
         """Return the inertial rate about the z axis of a site, the Earth's included where it is asked for."""
         rate = self._column(f"rate_{site}", rows)
-        if self.parameters.earth_rate is None:
-            return rate
-        first = self.model.sensor(f"axis_{site}").adr[0]
-        return rate + self._earth(rows[:, first : first + 3].T)
-
-    def _earth(self, axis: FloatArray) -> FloatArray | float:
-        """Return the Earth's rate along an axis, shape (3, n_time); MuJoCo's laboratory does not turn."""
-        earth = self.parameters.earth_rate
-        if earth is None:
-            return 0.0
-        x, y, z = earth.vector
-        # No matrix product: its order of additions depends on the length of the block.
-        rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+        if self.parameters.earth_rate is not None:
+            first = self.model.sensor(f"axis_{site}").adr[0]
+            rate += _along(self.parameters.earth_rate, rows[:, first : first + 3].T)
         return rate
 
     def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
@@ -284,6 +278,14 @@ def check_plant(parameters: TurntableParameters, sample_rate_hz: float, substeps
     check_floor(parameters, sample_rate_hz)
     if parameters.mode == "digital":
         check_loop(parameters, sample_rate_hz)
+
+
+def _along(earth: EarthRate, axis: FloatArray) -> FloatArray:
+    """Return the Earth's rate along an axis, shape (3, n_time); shape (n_time,). MuJoCo's laboratory does not turn."""
+    x, y, z = earth.vector
+    # No matrix product: its order of additions depends on the length of the block.
+    rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+    return rate
 
 
 def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:

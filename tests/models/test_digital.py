@@ -221,10 +221,10 @@ def test_unstable_loop_is_refused_before_the_run() -> None:
 
 
 def test_plant_that_diverges_is_reported() -> None:
-    """The rigid-spindle check knows nothing of the gravity that a wild command of rate meets; a huge start must not pass."""
     block = MotionProfile([lambda t: np.full_like(t, 1e7)], 0.0, FS).process(10)
-    with pytest.raises(RunError, match="the run got this far"):
-        run(parameters(encoder_bits=8), block)
+    strong = parameters().model_copy(update={"torque_limit": 1e12})
+    with pytest.raises(RunError, match="the plant diverged at t = 0 s; the run got this far"):
+        run(strong, block)
 
 
 @pytest.mark.parametrize("substeps", [1, 3])

@@ -186,8 +186,11 @@ def test_wobble_tilts_the_spin_axis_through_the_compliance_of_the_bearing(period
     # The tilt is held over each step: within one the bearing pulls back and forth, and at its ends the rate is lower by
     # (corner h)^2 / 12 = 3e-5 than on average.
     expected = s * size * compliance * np.exp(1j * (periods - 1) * angle) * (1 - (corner * DT) ** 2 / 12)
-    # The same of the spindle, kp / I h^2 / 12 = 1.9e-5, comes in with the turning of the sensor's axes.
-    assert np.abs(felt / expected - 1).max() < 1.9e-5
+    # The same of the spindle, kp / I h^2 / 12, comes in with the turning of the sensor's axes.
+    spindle = servo.gains(p)[0] / p.spindle_inertia * DT**2 / 12
+    assert np.abs(felt / expected - 1).max() < spindle
+    assert truth.encoder_rate[late].mean() / spin - 1 == pytest.approx(-spindle, rel=0.01)
+    assert spindle == pytest.approx(1.85e-5, rel=1e-3)
     assert abs(abs(compliance) - 1) > 1e-3  # so the compliance and the gyroscopic moment are seen
     # About its own axis the table feels the wobble in second order only.
     assert np.abs(truth.rate[late] - truth.encoder_rate[late]).max() < 1e-7 * spin
