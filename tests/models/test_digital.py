@@ -188,6 +188,18 @@ def test_required_torque_bounds_what_the_motor_gives() -> None:
         assert 0.8 * needed < torque < needed
 
 
+@pytest.mark.oracle
+def test_required_torque_is_ripple_hold_count_and_cogging() -> None:
+    ripple = (Ripple(relative=0.02, periods=6), Ripple(relative=0.03, periods=7))
+    p = parameters(controller_rate=5e3, encoder_bits=20, ripple=ripple)
+    block = MotionProfile([lambda t: 40.0 * t], 0.0, FS).process(10)
+    kp, kv = 0.05 * 2 * np.pi * 150 * 2 * np.pi * 15, 0.05 * 2 * np.pi * 150
+    count, alpha = 2 * np.pi / 2**20, 1 - np.exp(-2 * np.pi * 600 / 5e3)
+    motion = 0.05 * 40.0 + 5e-4 * block.rate_mid
+    expected = 1.05 * motion + kv * 40.0 * (200e-6 - 50e-6) / 2 + (kp + kv * alpha * 5e3) * count + 2e-3
+    np.testing.assert_allclose(required_torque(p, block, FS), expected, rtol=1e-9)  # 40 t over 50 us rounds at 1e-12
+
+
 # ---------------------------------------------------------------- failures
 
 

@@ -196,6 +196,16 @@ def test_wobble_tilts_the_spin_axis_through_the_compliance_of_the_bearing(period
     assert np.abs(truth.rate[late] - truth.encoder_rate[late]).max() < 1e-7 * spin
 
 
+@pytest.mark.parametrize("mode", ["servo", "digital"])
+def test_table_at_rest_starts_in_the_tilt_that_its_bearing_enforces(mode: str) -> None:
+    p = TurntableParameters(mode=mode, cogging=(), wobble=(Wobble(axis="rx", angle=1e-4, periods=1, phase=1.0),))
+    truth = Turntable(p, SENSORS).process(constant(0.0, 2000))
+    # Newton's equilibrium leaves 1e-9 rad/s^2 at most, over a period of the slowest mode.
+    assert max(np.abs(rate).max() for rate in truth.sensor_rate.values()) < 1e-9
+    tilt = np.hypot(*truth.poses["rotor"][1][0, 1:3]) * 2
+    assert tilt == pytest.approx(1e-4 * np.sin(1.0), rel=0.1)  # the bearing yields under the overhung mass
+
+
 def test_wobble_reaches_a_misaligned_sensor() -> None:
     p = TurntableParameters(wobble=(Wobble(axis="rx", angle=1e-4, periods=1),))
     mountings = {"straight": Mounting(), "tilted": Mounting(misalignment=(0.0, 0.01))}
