@@ -60,14 +60,14 @@ def copies(block: CommandBlock) -> Callable[[], object]:
 
 
 def cost() -> None:
-    for mode in ("servo", "ideal"):
+    for mode in ("servo", "digital", "ideal"):
         own, model = stepped(TurntableParameters(mode=mode))
         peer = bare(model)
-        print(f"{mode:6} {own:7.3f} us/step, bare mujoco.rollout {peer:7.3f} us/step, ratio {own / peer:.2f}")
+        print(f"{mode:7} {own:7.3f} us/step, bare mujoco.rollout {peer:7.3f} us/step, ratio {own / peer:.2f}")
     own, _ = stepped(TurntableParameters(mode="fixed"))
     peer = best_of(20, copies(profile().process(BLOCK)))
     hour = own * 1e-6 * FS * 3600
-    print(f"fixed  {own:7.4f} us/step, copying its arrays {peer:7.4f} us/step: 1 h of truth in {hour:.1f} s")
+    print(f"fixed   {own:7.4f} us/step, copying its arrays {peer:7.4f} us/step: 1 h of truth in {hour:.1f} s")
 
 
 def halving() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from testbed.errors import ScenarioError
 from testbed.metrics import METRICS
 from testbed.models.servo import required_torque
-from testbed.models.table_modes import check_modes
+from testbed.models.turntable import check_plant
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.step_choice import given_step
 
@@ -70,15 +70,14 @@ def _check_clocks(scenario: Scenario, document: Document) -> None:
 def _check_plant(scenario: Scenario, document: Document) -> None:
     parameters = scenario.turntable
     try:
-        given_step(parameters)
+        step = given_step(parameters)
     except ScenarioError as error:
         document.find(("turntable", "step"), _reasons(error))
         return
-    if parameters.mode == "servo":
-        try:
-            check_modes(parameters, 1.0 / BASE_RATE_HZ if parameters.step == "auto" else float(parameters.step))
-        except ScenarioError as error:
-            document.find(("turntable",), _reasons(error))
+    try:
+        check_plant(parameters, BASE_RATE_HZ, step.substeps, step.holds)
+    except ScenarioError as error:
+        document.find(("turntable",), _reasons(error))
 
 
 def _reasons(error: ScenarioError) -> str:
@@ -139,7 +138,7 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
                 f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, +-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
             )
     limit = scenario.turntable.torque_limit
-    if scenario.turntable.mode == "servo" and peak_torque > limit:
+    if scenario.turntable.has_plant and peak_torque > limit:
         document.find(
             ("motion",),
             f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'ideal'",

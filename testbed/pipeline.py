@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from testbed.errors import RunError
 from testbed.models.turntable import Turntable
 from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings
+from testbed.signals import random_stream
 from testbed.step_choice import choose_step
 
 if TYPE_CHECKING:
@@ -68,6 +70,7 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion = scenario.profile()
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
+        seed, duration = scenario.frame.seed, scenario.frame.duration
         self.step = choose_step(scenario)
         self.turntable = Turntable(
             scenario.turntable,
@@ -77,6 +80,7 @@ class Chain:
             holds=self.step.holds,
             pose_stride=POSE_STRIDE,
             exposed=[name for name, sensor in scenario.sensors.items() if sensor.exposed],
+            floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
         )
         self._temperature = scenario.frame.temperature
         self._sensors = {

@@ -74,7 +74,7 @@ def choose_step(scenario: Scenario) -> StepChoice:
         return StepChoice()
     if choice.holds > 1:
         return replace(choice, error=_Excerpts(scenario).error(choice.holds))
-    if scenario.turntable.step != "auto" or scenario.turntable.mode not in _LEAPS:
+    if scenario.turntable.step != "auto" or not _may_leap(scenario.turntable):
         return choice
     excerpts = _Excerpts(scenario)
     for holds in range(2, _MOST_HOLDS + 1):
@@ -128,10 +128,16 @@ def given_step(parameters: TurntableParameters) -> StepChoice:
     if abs(holds / substeps - ratio) > 1e-9 * ratio:
         msg = f"expected auto, or {base} times or divided by a whole number, got {ratio / BASE_RATE_HZ * 1e6:g} us"
         raise ScenarioError(msg)
-    if holds > 1 and parameters.mode not in (*_LEAPS, "fixed"):
-        msg = f"expected at most {base} in mode {parameters.mode}, got {ratio / BASE_RATE_HZ * 1e6:g} us"
+    if holds > 1 and parameters.mode != "fixed" and not _may_leap(parameters):
+        why = "with a moving floor" if parameters.mode in _LEAPS else f"in mode {parameters.mode}"
+        msg = f"expected at most {base} {why}, got {ratio / BASE_RATE_HZ * 1e6:g} us"
         raise ScenarioError(msg)
     return StepChoice(holds, substeps)
+
+
+def _may_leap(parameters: TurntableParameters) -> bool:
+    """Return whether excerpts of the motion stand for the run: not for a loop of its own clock, nor for a floor of its own time."""
+    return parameters.mode in _LEAPS and not parameters.floor.top_frequency()
 
 
 class _Excerpts:

@@ -98,7 +98,15 @@ def test_load_of_the_resolved_scenario_gives_the_same_run(tmp_path):
         ("name: good", "name: ../bad", 1, "name", "match pattern"),
         ("name: good\n", "", None, "name", "is required"),
         ("preset: air_bearing", "preset: air_bering", 5, "turntable.preset", "did you mean 'air_bearing'"),
-        ("{preset: air_bearing}", "{preset: air_bearing, mode: flying}", 5, "turntable.mode", "'servo', 'ideal' or 'fixed'"),
+        ("{preset: air_bearing}", "{preset: air_bearing, mode: flying}", 5, "turntable.mode", "'servo', 'digital', 'ideal' or 'fixed'"),
+        ("{preset: air_bearing}", "{floor: {lines: [{axis: x, frequency: 3 Hz, angle: 1 urad}]}}", 5, "turntable.floor.lines.0", "expected displacement or acceleration for axis x, got angle"),
+        ("{preset: air_bearing}", "{floor: {lines: [{axis: x, frequency: 10 kHz, displacement: 1 nm}]}}", 5, "turntable", "expected frequencies below 10000 Hz"),
+        ("{preset: air_bearing}", "{floor: {bands: [{axis: rz, low: 1 Hz, high: 9 Hz, angular_acceleration_psd: 1e-8 (m/s^2)^2/Hz}]}}", 5, "turntable.floor.bands.0.angular_acceleration_psd", "wrong dimension"),
+        ("{preset: air_bearing}", "{mode: ideal, wobble: [{axis: rx, angle: 1 urad, periods: 2}]}", 5, "turntable", "wobble: expected mode 'servo' or 'digital'"),
+        ("{preset: air_bearing}", "{mode: digital, digital: {controller_rate: 3 kHz}}", 5, "turntable", "divided by a whole number"),
+        ("{preset: air_bearing}", "{mode: digital, digital: {controller_rate: 500 Hz}}", 5, "turntable", "expected a stable digital servo"),
+        ("{preset: air_bearing}", "{earth_rate: {latitude: 91 deg}}", 5, "turntable.earth_rate.latitude", "expected at most"),
+        ("{preset: air_bearing}", "{earth_rate: {latitude: 48}}", 5, "turntable.earth_rate.latitude", "the unit is missing"),
         ("{preset: air_bearing}", "{rotor_mass: -20 kg}", 5, "turntable.rotor_mass", "expected more than 0"),
         ("frequency: 0.5 Hz", "frequency: 0.5 rad/s", 7, "motion.0.sine.frequency", "wrong dimension"),
         ("angle: 5.555 mrad", "angel: 5.555 mrad", 7, "motion.0.sine.angel", "did you mean 'angle'"),
@@ -131,6 +139,21 @@ def test_load_refuses_a_motion_beyond_the_motor(tmp_path):
     problems = refused(tmp_path, "frequency: 10 Hz, rate: 0.18 deg/s", "frequency: 900 Hz, rate: 20 deg/s")
     assert any(re.search(r"needs a torque of 101 N m, more than the motor's 6 N m", p.message) for p in problems), (
         problems
+    )
+
+
+def test_high_torque_preset_takes_a_motion_that_the_plain_one_refuses(tmp_path):
+    motion = ("frequency: 10 Hz, rate: 0.18 deg/s", "frequency: 60 Hz, rate: 50 deg/s")
+    sensors = (
+        "  mhd_ars: {preset: sx300}\n  mems_gyro: {preset: adis16505_filtered, noise: off}",
+        "  mems_gyro: {preset: adis16505}",
+    )
+    text = GOOD.replace(*motion).replace(*sensors)
+    with pytest.raises(ScenarioError, match=r"needs a torque of 16\.\d N m, more than the motor's 6 N m"):
+        load(tmp_path, text)
+    assert (
+        load(tmp_path, text.replace("preset: air_bearing", "preset: air_bearing_high_torque")).turntable.torque_limit
+        == 26.0
     )
 
 

@@ -131,3 +131,16 @@ def test_a_users_own_filter_runs_from_yaml_and_its_shapes_are_checked(tmp_path, 
     assert np.array_equal(run.fusion["arw_shakf"].rate, 2.0 * run.sensors["mhd_ars"].rate)
     with pytest.raises(RunError, match=r"filter arw_shakf: expected rate of shape \(10000,\), got \(9999,\)"):
         testbed.run(short(tmp_path, ("  arw_shakf: {}", entry.replace("2.0", "2.0, lost: 1"))))
+
+
+FLOOR = "{floor: {bands: [{axis: rz, low: 2 Hz, high: 80 Hz, angular_acceleration_psd: 1e-6 (rad/s^2)^2/Hz}]}}"
+
+
+def test_the_seed_moves_the_floor_and_blocks_do_not(tmp_path):
+    scenario = short(tmp_path, ("{preset: air_bearing}", FLOOR))
+    first, parts = testbed.run(scenario).truth.rate, testbed.run(scenario, block=0.0371).truth.rate
+    other, quiet = testbed.run(scenario, seed=12).truth.rate, testbed.run(short(tmp_path)).truth.rate
+    assert np.array_equal(first, parts)
+    assert not np.array_equal(first, other)
+    assert np.std(first - quiet) == pytest.approx(np.std(other - quiet), rel=0.9)
+    assert 1e-6 < np.std(first - quiet) < 1e-3

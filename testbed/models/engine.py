@@ -60,27 +60,61 @@ class Engine:
         RunError
             If an input is not finite, or the plant diverges; with the time.
         """
-        bad = ~np.isfinite(control).all(axis=1)
-        if bad.any():
-            self._fail("a control that is not finite", start + int(np.argmax(bad)))
+        refuse_bad_control(control, start, self._dt)
         if not len(control):
             return np.empty((0, self._batch.model.nsensordata))
         held = np.repeat(control, self._substeps, axis=0)
         with quiet():
             record = self._batch.rollout(len(held), held[None], record=("sensordata",))
         rows: FloatArray = record["sensordata"][0, :: self._substeps]
-        wild = ~(np.abs(rows).max(axis=1) < _HUGE)
-        if wild.any():
-            self._fail("the plant diverged", start + int(np.argmax(wild)))
-        warnings = self._batch.warning[0, :, 1]
-        if warnings.any():
-            kind = mujoco.mjtWarning(int(np.argmax(warnings))).name.removeprefix("mjWARN_")
-            self._fail(f"MuJoCo stopped ({kind})", round(self._batch.time[0] / self._dt))
+        refuse_bad_rows(rows, start, self._batch.warning[0, :, 1], round(self._batch.time[0] / self._dt), self._dt)
         return rows
 
-    def _fail(self, what: str, k: int) -> None:
-        msg = f"turntable: {what} at t = {k * self._dt:.6g} s; the run got this far"
-        raise RunError(msg)
+
+def refuse_bad_control(control: FloatArray, start: int, dt: float) -> None:
+    """Raise RunError with the time if an input is not finite: MuJoCo would zero all of them and go on.
+
+    Parameters
+    ----------
+    control : ndarray, shape (n_time, nu)
+        Inputs of the steps from `start` on.
+    start : int
+        Index of the first step.
+    dt : float
+        Step of the base clock [s].
+    """
+    bad = ~np.isfinite(control).all(axis=1)
+    if bad.any():
+        _fail("a control that is not finite", start + int(np.argmax(bad)), dt)
+
+
+def refuse_bad_rows(rows: FloatArray, start: int, warnings: Any, reached: int, dt: float) -> None:
+    """Raise RunError with the time if the plant diverged or MuJoCo complained.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n_time, nsensordata)
+        Sensor rows from `start` on.
+    start : int
+        Index of the first row.
+    warnings : sequence of int
+        MuJoCo's counters of its warnings.
+    reached : int
+        Index of the step that MuJoCo got to.
+    dt : float
+        Step of the base clock [s].
+    """
+    wild = ~(np.abs(rows).max(axis=1) < _HUGE)
+    if wild.any():
+        _fail("the plant diverged", start + int(np.argmax(wild)), dt)
+    if np.any(warnings):
+        kind = mujoco.mjtWarning(int(np.argmax(warnings))).name.removeprefix("mjWARN_")
+        _fail(f"MuJoCo stopped ({kind})", reached, dt)
+
+
+def _fail(what: str, k: int, dt: float) -> None:
+    msg = f"turntable: {what} at t = {k * dt:.6g} s; the run got this far"
+    raise RunError(msg)
 
 
 @contextlib.contextmanager

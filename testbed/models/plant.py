@@ -44,7 +44,7 @@ def build(
     Parameters
     ----------
     parameters : TurntableParameters
-        Of the plant; mode `servo` gives 12 degrees of freedom, the others the spindle alone.
+        Of the plant; modes `servo` and `digital` give 12 degrees of freedom, the others the spindle alone.
     mountings : mapping of str to Mounting
         Sensor name to its place; each becomes a site and a visible geometry of that name.
     dt : float
@@ -56,7 +56,8 @@ def build(
     -------
     mujoco.MjModel
         Sensors in this order: every joint position, spindle rate, motor torque, angular velocity (3) at `table_axis`
-        and at each mounting, specific force (3) at the exposed ones.
+        and at each mounting; where the Earth's rate is asked for, then the z axis (3) of each of these sites; for each
+        exposed one specific force (3), and with the Earth's rate its x and y axes (3, 3).
 
     Raises
     ------
@@ -69,15 +70,16 @@ def build(
     spec.option.gravity = [0.0, 0.0, -parameters.gravity]
     off = mujoco.mjtDisableBit
     spec.option.disableflags = off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT | off.mjDSBL_AUTORESET
-    free = parameters.mode == "servo"
+    free = parameters.has_plant
     platform = _add_platform(spec, parameters, free=free)
     rotor = _add_rotor(spec, platform, parameters, free=free)
     _add_sites(rotor, parameters, mountings)
-    _add_motor(spec, parameters, servo=free)
-    _add_sensors(spec, mountings)
+    _add_motor(spec, parameters)
+    if free:
+        _add_cogging(spec, parameters)
+    _add_sensors(spec, mountings, axes=parameters.earth_rate is not None)
     for name in exposed:
-        kind, thing = mujoco.mjtSensor.mjSENS_ACCELEROMETER, mujoco.mjtObj.mjOBJ_SITE
-        spec.add_sensor(name=f"force_{name}", type=kind, objtype=thing, objname=name)
+        _add_exposed(spec, name, axes=parameters.earth_rate is not None)
     try:
         return spec.compile()
     except ValueError as error:
@@ -120,10 +122,14 @@ def _add_rotor(spec: Any, platform: Any, parameters: TurntableParameters, *, fre
         loads, freq_hz = (mass, mass, mass, inertia[0], inertia[1]), (radial, radial, axial, tilt, tilt)
         _suspend(spec, body, loads, freq_hz, parameters.bearing_damping)
     body.add_joint(
-        name=SPINDLE, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXES[2], damping=[parameters.spindle_drag, 0.0, 0.0]
+        name=SPINDLE,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=_AXES[2],
+        damping=[parameters.spindle_drag, parameters.spindle_windage, 0.0],
     )
     top = parameters.mounting_height
-    _add_cylinder(body, "shaft", 0.06, (0.0, 0.0), (0.0, top), _STEEL)
+    # The shaft ends inside the disc: two faces in one plane would flicker.
+    _add_cylinder(body, "shaft", 0.06, (0.0, 0.0), (0.0, top - 0.01), _STEEL)
     _add_cylinder(body, "disc", 0.16, (0.0, 0.0), (top - 0.02, top), _ALUMINIUM)
     # A mark on the rim: without it a turning disc looks still.
     body.add_geom(
@@ -143,14 +149,17 @@ def _suspend(spec: Any, body: Any, loads: tuple[float, ...], freq_hz: tuple[floa
         spring.set_to_pid(kp=load * corner**2, kv=2 * damping * corner * load, ctrlspec=1 | 2)
 
 
-def _add_motor(spec: Any, parameters: TurntableParameters, *, servo: bool) -> None:
+def _add_motor(spec: Any, parameters: TurntableParameters) -> None:
     motor = spec.add_actuator(name=MOTOR, target=SPINDLE, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    if not servo:
+    if parameters.mode != "servo":
         motor.set_to_motor()
         return
     kp, kv = gains(parameters)
     motor.set_to_pid(kp=kp, kv=kv, ctrlspec=1 | 2 | 4)
     motor.forcerange = [-parameters.torque_limit, parameters.torque_limit]
+
+
+def _add_cogging(spec: Any, parameters: TurntableParameters) -> None:
     for i, harmonic in enumerate(parameters.cogging):
         cogging = spec.add_actuator(name=f"cogging_{i}", target=SPINDLE, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         shape = [harmonic.torque, float(harmonic.periods), harmonic.phase]
@@ -172,7 +181,7 @@ def _add_sites(rotor: Any, parameters: TurntableParameters, mountings: Mapping[s
         rotor.add_geom(name=name, type=shape, size=size, pos=place + height * _AXES[2], quat=quat, rgba=rgba)
 
 
-def _add_sensors(spec: Any, mountings: Mapping[str, Mounting]) -> None:
+def _add_sensors(spec: Any, mountings: Mapping[str, Mounting], *, axes: bool) -> None:
     sensor, thing = mujoco.mjtSensor, mujoco.mjtObj
     for joint in spec.joints:
         spec.add_sensor(
@@ -182,6 +191,16 @@ def _add_sensors(spec: Any, mountings: Mapping[str, Mounting]) -> None:
     spec.add_sensor(name="torque", type=sensor.mjSENS_ACTUATORFRC, objtype=thing.mjOBJ_ACTUATOR, objname=MOTOR)
     for site in (AXIS, *mountings):
         spec.add_sensor(name=f"rate_{site}", type=sensor.mjSENS_GYRO, objtype=thing.mjOBJ_SITE, objname=site)
+    for site in (AXIS, *mountings) if axes else ():
+        spec.add_sensor(name=f"axis_{site}", type=sensor.mjSENS_FRAMEZAXIS, objtype=thing.mjOBJ_SITE, objname=site)
+
+
+def _add_exposed(spec: Any, site: str, *, axes: bool) -> None:
+    sensor, thing = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_SITE
+    spec.add_sensor(name=f"force_{site}", type=sensor.mjSENS_ACCELEROMETER, objtype=thing, objname=site)
+    if axes:
+        spec.add_sensor(name=f"axis_x_{site}", type=sensor.mjSENS_FRAMEXAXIS, objtype=thing, objname=site)
+        spec.add_sensor(name=f"axis_y_{site}", type=sensor.mjSENS_FRAMEYAXIS, objtype=thing, objname=site)
 
 
 def tilt(mounting: Mounting) -> FloatArray:

@@ -10,6 +10,8 @@ import numpy as np
 
 from testbed.errors import RunError
 from testbed.models import plant, servo, stepping, table_modes
+from testbed.models.digital import DigitalLoop, check_loop
+from testbed.models.disturbances import Disturbances, check_floor
 from testbed.models.engine import Engine
 from testbed.models.servo import required_torque
 from testbed.models.turntable_parameters import Cogging, Mounting, TurntableParameters
@@ -17,12 +19,14 @@ from testbed.models.turntable_parameters import Cogging, Mounting, TurntablePara
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
+    from testbed.models.earth import EarthRate
+    from testbed.models.floor import FloorMotion
     from testbed.models.motion import CommandBlock
     from testbed.signals import FloatArray
 
     Poses = dict[str, tuple[FloatArray, FloatArray]]
 
-__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "required_torque"]
+__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,9 @@ class TruthBlock:
     start : int
         Index k of the first sample.
     rate : ndarray, shape (n_time,)
-        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor.
+        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor; with the Earth's if asked for.
     angle : ndarray, shape (n_time,)
-        Inertial angle about the vertical, spindle plus platform yaw, not wrapped [rad].
+        Angle about the vertical, spindle plus platform yaw, not wrapped [rad]; without the Earth's.
     sensor_rate : dict of str to ndarray, shape (n_time,)
         What each sensor's own axis feels [rad/s].
     encoder_rate : ndarray, shape (n_time,)
@@ -84,11 +88,15 @@ class Turntable:
         Steps between two poses.
     exposed : collection of str, optional
         Sensors whose cross rates and specific forces are wanted too.
+    floor : FloorMotion, optional
+        The realisation of `parameters.floor`; needed if that floor moves.
 
     Raises
     ------
     ScenarioError
-        If the plant cannot be built, falls over, or is too stiff for the step.
+        If the plant cannot be built, falls over, is too stiff for the step, or its digital servo is unstable.
+    ValueError
+        If the floor moves and `floor` is not given.
     """
 
     def __init__(
@@ -101,11 +109,11 @@ class Turntable:
         holds: int = 1,
         pose_stride: int = 400,
         exposed: Collection[str] = (),
+        floor: FloorMotion | None = None,
     ) -> None:
         self.parameters = parameters
         self._dt = 1.0 / sample_rate_hz
-        if parameters.mode == "servo":
-            table_modes.check_modes(parameters, self._dt * holds / substeps)
+        check_plant(parameters, sample_rate_hz, substeps, holds)
         self.model = plant.build(parameters, mountings, self._dt * holds / substeps, exposed)
         self._data = mujoco.MjData(self.model)
         self._motor = int(self.model.actuator_ctrladr[self.model.actuator(plant.MOTOR).id])
@@ -113,8 +121,13 @@ class Turntable:
         self._substeps, self._holds, self._stride = substeps, holds, pose_stride
         self.lookahead = stepping.lookahead(holds) if parameters.mode != "fixed" else 0
         self._next: int | None = None
-        self._engine: Engine | None = None
+        self._engine: Engine | DigitalLoop | None = None
         self._long: stepping.LongSteps | None = None
+        self._disturbances = (
+            Disturbances(self.model, parameters, floor, sample_rate_hz) if parameters.has_plant else None
+        )
+        # The axis of each site on the table at angle 0: what turns with it in mode `fixed`.
+        self._axes = {name: plant.rotation(self.model.site(name).quat)[:, 2] for name in (plant.AXIS, *mountings)}
 
     def process(self, command: CommandBlock, ahead: CommandBlock | None = None) -> TruthBlock:
         """Follow the command over its steps.
@@ -150,7 +163,10 @@ class Turntable:
     def _simulate(self, command: CommandBlock) -> FloatArray:
         if self._engine is None:
             self._engine = self._start(command)
-        return self._engine.advance(command.start, self._control(command))
+        control = self._control(command)
+        if isinstance(self._engine, DigitalLoop):
+            return self._engine.advance(command.start, control, command.angle[:-1])
+        return self._engine.advance(command.start, control)
 
     def _leap(self, command: CommandBlock, ahead: CommandBlock | None) -> FloatArray:
         """Return the sensor rows of integration steps that span several holds."""
@@ -174,31 +190,33 @@ class Turntable:
     def _truth(self, command: CommandBlock, rows: FloatArray) -> TruthBlock:
         self._check_motor(command.start, self._column("torque", rows))
         angles = rows[:, : self.model.nq]
-        yaw = self._column("q_platform_rz", rows) if self.parameters.mode == "servo" else 0.0
+        yaw = self._column("q_platform_rz", rows) if self.parameters.has_plant else 0.0
         return TruthBlock(
             start=command.start,
-            rate=self._column(f"rate_{plant.AXIS}", rows),
+            rate=self._rate(plant.AXIS, rows),
             angle=self._column(f"q_{plant.SPINDLE}", rows) + yaw,
-            sensor_rate={name: self._column(f"rate_{name}", rows) for name in self._names},
+            sensor_rate={name: self._rate(name, rows) for name in self._names},
             encoder_rate=self._column("encoder_rate", rows),
             torque=self._column("torque", rows),
             poses=self._poses(command.start, angles),
-            cross_rate={name: self._columns(f"rate_{name}", rows)[:, :2] for name in self._exposed},
+            cross_rate={name: self._cross_rate(name, rows) for name in self._exposed},
             specific_force={name: self._columns(f"force_{name}", rows) for name in self._exposed},
         )
 
     def _fixed(self, command: CommandBlock) -> TruthBlock:
         rate, angle = command.rate[:-1].copy(), command.angle[:-1].copy()
-        # A rate about the vertical, seen along a tilted axis: the last element of the site's rotation.
-        projection = {name: float(plant.rotation(self.model.site(name).quat)[2, 2]) for name in self._names}
-        sensor_rate = {name: factor * rate for name, factor in projection.items()}
+        # A rate about the vertical, seen along a tilted axis.
+        felt = {name: axis[2] * rate for name, axis in self._axes.items()}
+        if self.parameters.earth_rate is not None:
+            for name, axis in self._axes.items():
+                felt[name] += _along(self.parameters.earth_rate, _turned(axis, angle))
         surroundings = {name: self._fixed_surroundings(name, command) for name in self._exposed}
         return TruthBlock(
             start=command.start,
-            rate=rate,
+            rate=felt.pop(plant.AXIS),
             angle=angle,
-            sensor_rate=sensor_rate,
-            encoder_rate=rate.copy(),
+            sensor_rate=felt,
+            encoder_rate=rate,
             torque=np.zeros(command.n_time),
             poses=self._poses(command.start, angle[:, None]),
             cross_rate={name: cross for name, (cross, _) in surroundings.items()},
@@ -216,7 +234,11 @@ class Turntable:
         ]
         to_table = plant.rotation(self.model.site(name).quat)
         turned: FloatArray = (to_table.T[:, :, None] * np.array(force)).sum(axis=1).T
-        return rate[:, None] * to_table[2, :2], turned
+        cross: FloatArray = rate[:, None] * to_table[2, :2]
+        if self.parameters.earth_rate is not None:
+            for i in range(2):
+                cross[:, i] += _along(self.parameters.earth_rate, _turned(to_table[:, i], command.angle[:-1]))
+        return cross, turned
 
     def _start_long(self, command: CommandBlock, control: FloatArray) -> stepping.LongSteps:
         data, qvel = self._at_start(command)
@@ -225,18 +247,25 @@ class Turntable:
         engine = Engine(self.model, data.qpos, qvel, self._substeps)
         return stepping.LongSteps(engine, sensed, self._holds, self._dt)
 
-    def _start(self, command: CommandBlock) -> Engine:
+    def _start(self, command: CommandBlock) -> Engine | DigitalLoop:
         data, qvel = self._at_start(command)
+        if self.parameters.mode == "digital":
+            return DigitalLoop(self.model, data.qpos, qvel, self._substeps, self.parameters)
         return Engine(self.model, data.qpos, qvel, self._substeps)
 
     def _at_start(self, command: CommandBlock) -> tuple[Any, FloatArray]:
         """Return the table in its equilibrium at the commanded angle, and its first velocities."""
-        data, parameters = mujoco.MjData(self.model), self.parameters
-        spindle = self.model.joint(plant.SPINDLE).qposadr[0]
-        data.qpos[spindle] = command.angle[0]
-        if parameters.mode == "servo":
-            data.ctrl[self._motor] = command.angle[0]
-            table_modes.settle(self.model, data)
+        parameters, angle = self.parameters, command.angle[0]
+        # The analogue servo holds the table at rest, so that its equilibrium is one of springs alone.
+        analogue = parameters.model_copy(update={"mode": "servo"})
+        rest = plant.build(analogue, {}, self._dt) if parameters.mode == "digital" else self.model
+        data = mujoco.MjData(rest)
+        spindle = rest.joint(plant.SPINDLE).qposadr[0]
+        data.qpos[spindle] = angle
+        if self._disturbances is not None:
+            data.ctrl[rest.actuator_ctrladr[rest.actuator(plant.MOTOR).id]] = angle
+            self._disturbances.at_start(data.ctrl, angle)
+            table_modes.settle(rest, data)
         qvel = np.zeros(self.model.nv)
         qvel[spindle] = command.rate[0]
         return data, qvel
@@ -245,13 +274,32 @@ class Turntable:
         control = np.zeros((command.n_time, self.model.nu))
         parameters = self.parameters
         if parameters.mode == "ideal":
-            drag = parameters.spindle_drag
-            control[:, self._motor] = servo.exact_torque(parameters.spindle_inertia, drag, command.rate, self._dt)
+            control[:, self._motor] = servo.exact_torque(parameters, command.rate, self._dt)
+        elif parameters.mode == "digital":
+            control[:, self._motor] = servo.feed_forward(parameters, command, self._dt)
         else:
             control[:, self._motor] = command.angle_mid
             control[:, self._motor + 1] = command.rate_mid
             control[:, self._motor + 2] = servo.feed_forward(parameters, command, self._dt)
+        if self._disturbances is not None:
+            self._disturbances.apply(control, command.start, command.angle_mid, command.rate_mid)
         return control
+
+    def _rate(self, site: str, rows: FloatArray) -> FloatArray:
+        """Return the inertial rate about the z axis of a site, the Earth's included where it is asked for."""
+        rate = self._column(f"rate_{site}", rows)
+        if self.parameters.earth_rate is not None:
+            first = self.model.sensor(f"axis_{site}").adr[0]
+            rate += _along(self.parameters.earth_rate, rows[:, first : first + 3].T)
+        return rate
+
+    def _cross_rate(self, site: str, rows: FloatArray) -> FloatArray:
+        """Return the inertial rates about the x and y axes of a site, shape (n_time, 2), the Earth's included."""
+        cross = self._columns(f"rate_{site}", rows)[:, :2]
+        if self.parameters.earth_rate is not None:
+            for i, axis in enumerate(("axis_x", "axis_y")):
+                cross[:, i] += _along(self.parameters.earth_rate, self._columns(f"{axis}_{site}", rows).T)
+        return cross
 
     def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
         """Return the last component of a sensor: the value of a scalar, the z of an angular velocity."""
@@ -290,3 +338,43 @@ class Turntable:
             t = (start + int(np.argmax(saturated))) * self._dt
             msg = f"turntable: the motor saturated at its {limit:g} N*m at t = {t:.6g} s; the run got this far"
             raise RunError(msg)
+
+
+def check_plant(parameters: TurntableParameters, sample_rate_hz: float, substeps: int = 1, holds: int = 1) -> None:
+    """Refuse a table that cannot be run: unstable, too stiff for the step, or faster than the clock.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Of the plant; modes without one are always accepted.
+    sample_rate_hz : float
+        Base clock [Hz].
+    substeps, holds : int, optional
+        Integration steps per step of the base clock, and steps of the base clock per integration step.
+
+    Raises
+    ------
+    ScenarioError
+        Saying what was expected.
+    """
+    if not parameters.has_plant:
+        return
+    table_modes.check_modes(parameters, holds / sample_rate_hz / substeps)
+    check_floor(parameters, sample_rate_hz)
+    if parameters.mode == "digital":
+        check_loop(parameters, sample_rate_hz)
+
+
+def _along(earth: EarthRate, axis: FloatArray) -> FloatArray:
+    """Return the Earth's rate along an axis, shape (3, n_time); shape (n_time,). MuJoCo's laboratory does not turn."""
+    x, y, z = earth.vector
+    # No matrix product: its order of additions depends on the length of the block.
+    rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+    return rate
+
+
+def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return an axis, shape (3,), turned about the vertical by angles, shape (n_time,); shape (3, n_time)."""
+    x, y, z = axis
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y, np.full_like(c, z)])

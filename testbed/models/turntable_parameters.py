@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+import numpy as np
+from pydantic import Field, field_validator, model_validator
 
+from testbed.models.earth import EarthRate
+from testbed.models.floor import Floor
 from testbed.parts import Part
 from testbed.units import Angle, AngularDrag, Frequency, Inertia, Length, Mass, Position, Quantity, Torque
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from pydantic import ValidationInfo
 
 
@@ -30,6 +35,8 @@ Step = Annotated[float | Literal["auto"], AutoQuantity("s", "50 us", above=0.0)]
 PositiveTorque = Annotated[float, Quantity("N*m", "6 N*m", above=0.0)]
 Acceleration = Annotated[float, Quantity("m/s^2", "9.80665 m/s^2", at_least=0.0)]
 DampingRatio = Annotated[float, Field(gt=0.0, lt=1.0, allow_inf_nan=False)]
+Windage = Annotated[float, Quantity("N*m*s^2/rad^2", "0.1 mN*m*s^2/rad^2", at_least=0.0)]
+Share = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False)]
 RelativeError = Annotated[float, Field(gt=-1.0, lt=10.0, allow_inf_nan=False)]
 Vector = tuple[Position, Position, Position]
 Inertias = tuple[Inertia, Inertia, Inertia]
@@ -71,6 +78,90 @@ class Cogging(Part):
     phase: Angle = 0.0
 
 
+class Wobble(Part):
+    """One harmonic of the bearing's synchronous tilt error motion: the tilt it enforces is A sin(n angle + phase).
+
+    Parameters
+    ----------
+    axis : {"rx", "ry"}
+        Tilt of the spin axis about the stator's x or y.
+    angle : float
+        Amplitude A [rad].
+    periods : int
+        Periods n per revolution.
+    phase : float
+        Phase [rad].
+    """
+
+    axis: Literal["rx", "ry"]
+    angle: Angle
+    periods: Annotated[int, Field(ge=1)]
+    phase: Angle = 0.0
+
+
+class Ripple(Part):
+    """One harmonic of the motor's torque over current: torque = command (1 + r sin(n angle + phase)).
+
+    Parameters
+    ----------
+    relative : float
+        Amplitude r, relative to the mean [-].
+    periods : int
+        Periods n per revolution.
+    phase : float
+        Phase [rad].
+    """
+
+    relative: Share
+    periods: Annotated[int, Field(ge=1)]
+    phase: Angle = 0.0
+
+
+class Digital(Part):
+    """What the servo of mode `digital` has beyond that of mode `servo`.
+
+    Parameters
+    ----------
+    encoder_bits : int
+        The encoder gives 2^bits counts per revolution.
+    controller_rate : float
+        Ticks of the controller per second [Hz]; the base clock is a whole multiple. The torque is held between them.
+    velocity_filter : float
+        Corner of the first-order filter on the differences of the encoder, and of the reference [Hz].
+    ripple : tuple of Ripple
+        Harmonics of the motor's torque, proportional to its current; empty for none.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If the ripple could turn the motor's torque around.
+    """
+
+    encoder_bits: Annotated[int, Field(ge=8, le=40)] = 24
+    controller_rate: Frequency = 20000.0
+    velocity_filter: Frequency = 600.0
+    ripple: tuple[Ripple, ...] = (Ripple(relative=0.005, periods=12),)
+
+    @field_validator("ripple")
+    @classmethod
+    def _keeps_sign(cls, ripple: tuple[Ripple, ...]) -> tuple[Ripple, ...]:
+        total = sum(one.relative for one in ripple)
+        if total >= 1.0:
+            msg = f"expected amplitudes of less than 1 in sum, got {total:g}"
+            raise ValueError(msg)
+        return ripple
+
+    @property
+    def resolution(self) -> float:
+        """One count of the encoder [rad]."""
+        return float(2 * np.pi / 2**self.encoder_bits)
+
+    @property
+    def filter_gain(self) -> float:
+        """Gain 1 - exp(-2 pi f T) of the filter per tick."""
+        return float(-np.expm1(-2 * np.pi * self.velocity_filter / self.controller_rate))
+
+
 class TurntableParameters(Part):
     """The turntable: isolated platform, air-bearing rotor, motor and servo.
 
@@ -80,9 +171,10 @@ class TurntableParameters(Part):
 
     Parameters
     ----------
-    mode : {"servo", "ideal", "fixed"}
-        `servo`: the full plant follows the command as its servo can. `ideal`: a single hinge under the exact inverse
-        torque. `fixed`: no plant, the truth is the command.
+    mode : {"servo", "digital", "ideal", "fixed"}
+        `servo`: the full plant follows the command as its analogue servo can. `digital`: the same under a sampled
+        controller that reads a quantised encoder. `ideal`: a single hinge under the exact inverse torque. `fixed`: no
+        plant, the truth is the command.
     step : float or "auto"
         Integration step [s]; a whole part or multiple of the 50 us over which references are held, or `auto`: as long
         as the true rate stays within 1e-6 of its largest value, see `testbed.step_choice.choose_step`.
@@ -114,6 +206,8 @@ class TurntableParameters(Part):
         Damping ratio of these [-].
     spindle_drag : float
         Viscous drag of the spindle [N m s/rad].
+    spindle_windage : float
+        Quadratic drag b of the spindle [N m s^2/rad^2]: torque b rate |rate|.
     torque_limit : float
         Largest torque of the motor [N m].
     cogging : tuple of Cogging
@@ -123,15 +217,24 @@ class TurntableParameters(Part):
     position_bandwidth : float
         Corner of its position loop [Hz]: kp = kv 2 pi f.
     feedforward_inertia_error, feedforward_drag_error : float
-        Relative error of the inertia and the drag that the feed-forward believes in [-].
+        Relative error of the inertia and the drag (both kinds) that the feed-forward believes in [-].
+    digital : Digital
+        Encoder, controller and ripple of mode `digital`.
+    floor : Floor
+        Vibration of the floor below the mounts; modes `servo` and `digital`.
+    wobble : tuple of Wobble
+        Harmonics of the bearing's tilt error motion; empty for none; modes `servo` and `digital`.
+    earth_rate : EarthRate or None
+        Site and heading of the table: adds the Earth's rotation to the truth, in every mode.
 
     Raises
     ------
     pydantic.ValidationError
-        If a value is not finite, not positive, or if inertias violate the triangle inequality.
+        If a value is not finite, not positive, if inertias violate the triangle inequality, or if floor or wobble are
+        asked of a mode that has neither platform nor bearing.
     """
 
-    mode: Literal["servo", "ideal", "fixed"] = "servo"
+    mode: Literal["servo", "digital", "ideal", "fixed"] = "servo"
     step: Step = 5e-5
     gravity: Acceleration = 9.80665
     platform_mass: Mass = 400.0
@@ -149,12 +252,17 @@ class TurntableParameters(Part):
     tilt_frequency: Frequency = 300.0
     bearing_damping: DampingRatio = 0.03
     spindle_drag: AngularDrag = 5e-4
+    spindle_windage: Windage = 0.0
     torque_limit: PositiveTorque = 6.0
     cogging: tuple[Cogging, ...] = (Cogging(torque=2e-3, periods=24, phase=0.3),)
     rate_bandwidth: Frequency = 150.0
     position_bandwidth: Frequency = 15.0
     feedforward_inertia_error: RelativeError = 0.0
     feedforward_drag_error: RelativeError = 0.0
+    digital: Digital = Digital()
+    floor: Floor = Floor()
+    wobble: tuple[Wobble, ...] = ()
+    earth_rate: EarthRate | None = None
 
     @field_validator("platform_inertia", "rotor_inertia")
     @classmethod
@@ -164,6 +272,19 @@ class TurntableParameters(Part):
             msg = f"expected principal inertias of a body, none above the sum of the others, got {inertia} kg*m^2"
             raise ValueError(msg)
         return inertia
+
+    @model_validator(mode="after")
+    def _disturbs_a_plant(self) -> Self:
+        if (self.floor.top_frequency() or self.wobble) and not self.has_plant:
+            name = "wobble" if self.wobble else "floor"
+            msg = f"{name}: expected mode 'servo' or 'digital', which have platform and bearing, got mode {self.mode!r}"
+            raise ValueError(msg)
+        return self
+
+    @property
+    def has_plant(self) -> bool:
+        """Whether the mode has the full plant with platform, bearing and servo."""
+        return self.mode in {"servo", "digital"}
 
     @property
     def spindle_inertia(self) -> float:

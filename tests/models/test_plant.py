@@ -14,10 +14,12 @@ from pydantic import ValidationError
 
 from testbed.errors import RunError, ScenarioError
 from testbed.models import plant, servo
+from testbed.models.earth import EarthRate
 from testbed.models.engine import Engine
+from testbed.models.floor import Floor, FloorBand, FloorLine
 from testbed.models.table_modes import check_modes, coupled_modes, settle
-from testbed.models.turntable_parameters import Cogging, Mounting, TurntableParameters
-from testbed.parts import preset
+from testbed.models.turntable_parameters import Cogging, Digital, Mounting, Ripple, TurntableParameters, Wobble
+from testbed.parts import preset, preset_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,12 +40,25 @@ def chain(load: tuple[float, float], freq: tuple[float, float], damping: tuple[f
 def test_parameters_equal_the_preset() -> None:
     read = TurntableParameters.model_validate(preset("testbed.models", "air_bearing"), context={"border": True})
     assert read == TurntableParameters()
-    assert set(preset("testbed.models", "air_bearing")) == set(TurntableParameters.model_fields)
+    # Where a table stands is the scenario's, not the device's.
+    assert set(preset("testbed.models", "air_bearing")) == set(TurntableParameters.model_fields) - {"earth_rate"}
 
 
 def test_parameters_survive_being_written_with_units() -> None:
-    parameters = TurntableParameters(rotor_com=(1e-4, 0.0, 0.05), torque_limit=0.1 + 0.2)
-    written = parameters.model_dump(context={"border": True})
+    parameters = TurntableParameters(
+        rotor_com=(1e-4, 0.0, 0.05),
+        torque_limit=0.1 + 0.2,
+        spindle_windage=1e-4,
+        digital=Digital(encoder_bits=20, controller_rate=5e3, ripple=(Ripple(relative=0.01, periods=6, phase=0.1),)),
+        floor=Floor(
+            lines=(FloorLine(axis="rz", frequency=1.8, angle=1e-6), FloorLine(axis="z", frequency=50, acceleration=1)),
+            bands=(FloorBand(axis="x", low=1, high=80, acceleration_psd=1e-8),),
+            ramp_in=0.0,
+        ),
+        wobble=(Wobble(axis="rx", angle=1e-6, periods=2, phase=-0.5),),
+        earth_rate=EarthRate(latitude=np.deg2rad(48), azimuth=0.1),
+    )
+    written = parameters.model_dump(mode="json", context={"border": True}, exclude_none=True)
     assert written["rotor_mass"] == "20.0 kg"
     assert TurntableParameters.model_validate(written, context={"border": True}) == parameters
 
@@ -54,11 +69,16 @@ def test_flat_bodies_can_be_drawn() -> None:
     assert np.isfinite(model.geom_size).all()
 
 
-def test_preset_marks_every_value_with_its_source() -> None:
-    text = (resources.files("testbed.models") / "presets" / "air_bearing.yaml").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", preset_names("testbed.models"))
+def test_preset_marks_every_value_with_its_source(name: str) -> None:
+    text = (resources.files("testbed.models") / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
     lines = text.splitlines()
     for i, line in enumerate(lines):
-        if line and not line.startswith("#") and not line.startswith(("mode:", "cogging:")):
+        if (
+            line
+            and not line.startswith("#")
+            and not line.lstrip().startswith(("mode:", "cogging:", "digital:", "ripple:"))
+        ):
             assert any(word in line + lines[i - 1] for word in ("assumed", "derived", "standard gravity")), line
 
 
@@ -79,8 +99,28 @@ def test_preset_marks_every_value_with_its_source() -> None:
         ({"feedforward_inertia_error": -1.0}, "greater than -1"),
         ({"cogging": ({"torque": float("nan"), "periods": 24},)}, "expected a quantity in N\\*m"),
         ({"cogging": ({"torque": 1e-3, "periods": 0},)}, "greater than or equal to 1"),
+        ({"spindle_windage": -1e-4}, "expected at least 0.0 N\\*m\\*s\\^2/rad\\^2"),
+        ({"digital": {"encoder_bits": 7}}, "greater than or equal to 8"),
+        ({"digital": {"encoder_bits": 24.5}}, "valid integer"),
+        ({"digital": {"controller_rate": 0.0}}, "expected more than 0.0 Hz"),
+        ({"digital": {"velocity_filter": float("nan")}}, "expected a quantity in Hz"),
+        ({"digital": {"ripple": ({"relative": float("nan"), "periods": 6},)}}, "less than 1|finite|greater"),
+        ({"digital": {"ripple": ({"relative": 0.6, "periods": 6},) * 2}}, "less than 1 in sum, got 1.2"),
+        ({"wobble": ({"axis": "rz", "angle": 1e-6, "periods": 1},)}, "'rx' or 'ry'"),
+        ({"wobble": ({"axis": "rx", "angle": float("inf"), "periods": 1},)}, "expected a quantity in rad"),
+        ({"wobble": ({"axis": "rx", "angle": 1e-6, "periods": 0},)}, "greater than or equal to 1"),
+        (
+            {"mode": "ideal", "wobble": ({"axis": "rx", "angle": 1e-6, "periods": 1},)},
+            "wobble: expected mode 'servo' or",
+        ),
+        (
+            {"mode": "fixed", "floor": {"lines": ({"axis": "x", "frequency": 1, "displacement": 1},)}},
+            "floor: expected mode",
+        ),
+        ({"earth_rate": {"latitude": 2.0}}, "expected at most"),
+        ({"earth_rate": {"azimuth": 2.0}}, "Field required"),
         ({"rotor_weight": 20.0}, "Extra inputs are not permitted"),
-        ({"mode": "digitl"}, "'servo', 'ideal' or 'fixed'"),
+        ({"mode": "digitl"}, "'servo', 'digital', 'ideal' or 'fixed'"),
     ],
 )
 def test_parameters_refuse_bad_value(change: dict[str, object], message: str) -> None:
@@ -282,3 +322,9 @@ def test_engine_refuses_nan_control_and_names_its_time() -> None:
 def test_parameters_do_not_import_mujoco() -> None:
     code = "import sys, testbed.models.turntable_parameters; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_no_two_faces_of_shaft_and_disc_lie_in_one_plane() -> None:
+    model = plant.build(TurntableParameters(), {}, DT)
+    ends = [model.geom(name).pos[2] + side * model.geom(name).size[1] for name in ("shaft", "disc") for side in (-1, 1)]
+    assert np.diff(np.sort(ends)).min() > 1e-3

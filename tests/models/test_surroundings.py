@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from testbed.models.earth import EarthRate
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
 from testbed.models.turntable import Mounting, TruthBlock, Turntable, TurntableParameters
@@ -73,3 +74,15 @@ def test_asking_changes_no_bit_of_the_truth() -> None:
         assert np.array_equal(getattr(asked, name), getattr(plain, name))
     assert np.array_equal(asked.sensor_rate["gyro"], plain.sensor_rate["gyro"])
     assert plain.cross_rate == plain.specific_force == {}
+
+
+@pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
+def test_cross_rates_include_the_earth(mode):
+    """A level table at rest at angle 0: x and y of the site see the horizontal part of the Earth's rate, z the vertical one."""
+    earth = EarthRate(latitude=np.deg2rad(48.0))
+    parameters = TurntableParameters(mode=mode, earth_rate=earth, cogging=())
+    table = Turntable(parameters, {"gyro": Mounting()}, exposed=["gyro"])
+    truth = table.process(MotionProfile([np.zeros_like], 0.0, 20_000.0).process(50))
+    felt = np.column_stack([truth.cross_rate["gyro"], truth.sensor_rate["gyro"]])
+    # The plant in equilibrium is level to the accuracy of its Newton iteration.
+    assert np.allclose(felt, earth.vector, rtol=0.0, atol=1e-9 * 7.3e-5)
