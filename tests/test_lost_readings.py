@@ -13,6 +13,7 @@ from testbed.pipeline import _sense
 from testbed.report.digest import _bridged
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
+from testbed.table_facts import table_facts
 from testbed.terminal import print_metrics, print_scenario
 from tests.scenes import short
 
@@ -165,7 +166,8 @@ def test_the_markov_bias_of_paper_1_is_a_key_of_its_own(tmp_path):
 
 
 def test_check_prints_the_data_sheet_of_the_gyro(tmp_path, capsys):
-    print_scenario(short(tmp_path))
+    scenario = short(tmp_path)
+    print_scenario(scenario, table_facts(scenario))
     out = capsys.readouterr().out
     for text in (
         "0.15 deg/sqrt(h)",
