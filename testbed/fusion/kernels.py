@@ -26,6 +26,8 @@ LEVEL, BANK_HEADER_ROWS = 2, 3
 REFUSED, BANK_ROWS = 2, 3
 # A reading beyond this [rad/s] is no rate, whatever the gate says: it would overflow the derivatives of the rate.
 LARGEST_RATE = 1e6
+# Beyond this [rad^2/s^2] a filter of the bank knows nothing of the rate.
+LOST_VARIANCE = 1.0
 # Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
 Q_RATE, GUARD_HITS, ADAPTIVE_HEADER_ROWS = 2, 3, 4
 R_USED, INCREMENTS, BAND, INFLATION, ADAPTIVE_ROWS = 2, 3, 4, 5, 6
@@ -171,8 +173,13 @@ def kalman_kernel(n: int, n_sensor: int) -> Any:
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict_bank(x, P, F, nonzero, Q, work, moved, n, M):  # pragma: no cover
-    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out."""
+def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
+
+    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double precision.
+    """
+    for m in range(M):
+        lost[m] = P[0, 0, m] > LOST_VARIANCE
     for i in range(n):
         for m in range(M):
             moved[i, m] = 0.0
@@ -188,16 +195,17 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, n, M):  # pragma: no cover
                     work[i, j, m] += factor * P[k, j, m]
     for i in range(n):
         for m in range(M):
-            x[i, m] = moved[i, m]
+            x[i, m] = x[i, m] if lost[m] else moved[i, m]
         for j in range(i + 1):
             for m in range(M):
-                P[i, j, m] = Q[i, j, m]
+                moved[i, m] = Q[i, j, m]
             for s in range(nonzero[j, n]):
                 k = nonzero[j, s]
                 factor = F[j, k]
                 for m in range(M):
-                    P[i, j, m] += factor * work[i, k, m]
+                    moved[i, m] += factor * work[i, k, m]
             for m in range(M):
+                P[i, j, m] = P[i, j, m] if lost[m] else moved[i, m]
                 P[j, i, m] = P[i, j, m]
 
 
@@ -309,13 +317,13 @@ def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))
         e, spread, weight = np.empty(M), np.empty(M), np.empty(M)
-        used = np.empty(n_sensor, dtype=np.bool_)
+        used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
         forget, gate, patience, stuck_after = setting[1], setting[2], setting[3], setting[4]
         weigh(score, weight, M)
         for k in range(Z.shape[1]):
             if setting[0] > 0.0:
-                predict_bank(x, P, F, nonzero, Q, work, moved, n, M)
+                predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M)
             informed = False
             for i in range(n_sensor):
                 row = BANK_HEADER_ROWS + BANK_ROWS * i

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class WidebandParameters(FilterParameters):
-    """Parameters of `Wideband`; q, here the lowest of the bank, is 1e2 (deg/s)^2/s^5 for order 3.
+    """Parameters of `Wideband`; q, here the lowest of the bank, is 1e4 (deg/s)^2/s^5 for order 3.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class WidebandParameters(FilterParameters):
         A sensor that repeats its reading exactly that often is taken for stuck and not read until it changes; 0 is never.
     """
 
-    default_q: ClassVar[dict[int, float]] = {3: 1e2 * DEG**2}
+    default_q: ClassVar[dict[int, float]] = {3: 1e4 * DEG**2}
 
     order: Annotated[int, Field(ge=1, le=3)] = 3
     decades: Annotated[float, Field(gt=0.0, le=30.0)] = 15.0
-    filters: Annotated[int, Field(ge=2, le=32)] = 7
+    filters: Annotated[int, Field(ge=2, le=32)] = 16
     memory: PositiveDuration = 0.05
     gate: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
     patience: Annotated[int, Field(ge=0)] = 10
