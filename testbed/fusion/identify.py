@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
 
 _ROUNDS = 200
+# Parts of the band (in logarithm) over which the poles are spread at the start: a search can end in a local minimum.
+_SPREADS = ((0.0, 1.0), (0.5, 1.0), (0.0, 0.5))
+# Half the sum of squares that is rounding only.
+_EXACT = 1e-20
 
 
 @dataclass(frozen=True)
@@ -104,17 +108,22 @@ def identify(
         error = w * (_fitted(s, H, w, _denominator(place, real_poles), blind_at_dc)[1] / H - 1.0)
         return np.concatenate([error.real, error.imag])
 
-    start = _start(np.abs(s), real_poles, pole_pairs)
-    found = least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=_ROUNDS * start.size)
-    D = _denominator(found.x, real_poles)
+    tried = []
+    for share in _SPREADS:
+        start = _start(np.abs(s), real_poles, pole_pairs, share)
+        rounds = _ROUNDS * start.size
+        tried.append(least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=rounds))
+        if tried[-1].cost < _EXACT:
+            break
+    D = _denominator(min(tried, key=lambda one: float(one.cost)).x, real_poles)
     N, G = _fitted(s, H, w, D, blind_at_dc)
     powers = unit ** np.arange(n_pole + 1.0)
     return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / H - 1.0))))
 
 
-def _start(reach: FloatArray, real_poles: int, pole_pairs: int) -> FloatArray:
-    """Return poles spread over the band: logarithms of the real ones, then of corner and damping of each pair."""
-    low, high = np.log(reach[0]), np.log(reach[-1])
+def _start(reach: FloatArray, real_poles: int, pole_pairs: int, share: tuple[float, float]) -> FloatArray:
+    """Return poles spread over a share of the band: logarithms of the real ones, then of corner and damping of each pair."""
+    low, high = np.interp(share, [0.0, 1.0], np.log([reach[0], reach[-1]]))
     real = low + (high - low) * (np.arange(real_poles) + 1.0) / (real_poles + 1.0)
     corners = low + (high - low) * (np.arange(pole_pairs) + 1.0) / (pole_pairs + 1.0)
     return np.concatenate([real, corners, np.full(pole_pairs, np.log(0.7))])
