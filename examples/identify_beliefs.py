@@ -40,14 +40,21 @@ def identified() -> dict[str, Identified]:
 
 def belief_file() -> str:
     """Return the text of the belief file."""
-    lines = ["# Written by examples/identify_beliefs.py from the responses of the presets; s in rad/s, highest power first."]
+    lines = [
+        "# Written by examples/identify_beliefs.py from the responses of the presets; s in rad/s, highest power first."
+    ]
     for name, fit in identified().items():
-        lines.append(f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to {FREQ_HZ[-1]:g} Hz")
-        for key in ("numerator", "denominator"):
-            # Nine digits: far below the misfit.
-            lines.append(f"  {key}: [{', '.join(f'{value:.9g}' for value in getattr(fit, key))}]")
-        for key, (value, source) in NOISE[name].items():
-            lines.append(f"  {key}: {value}" + (f"  # {source}" if source else ""))
+        lines.append(
+            f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to {FREQ_HZ[-1]:g} Hz"
+        )
+        # Nine digits: far below the misfit.
+        lines += [
+            f"  {key}: [{', '.join(f'{value:.9g}' for value in getattr(fit, key))}]"
+            for key in ("numerator", "denominator")
+        ]
+        lines += [
+            f"  {key}: {value}" + (f"  # {source}" if source else "") for key, (value, source) in NOISE[name].items()
+        ]
     return "\n".join(lines) + "\n"
 
 

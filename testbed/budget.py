@@ -108,9 +108,16 @@ def believed(sensor: Sensor) -> SensorBelief | None:
 
 
 def signal_optimum(
-    sensors: Mapping[str, Sensor], sample_rate_hz: Mapping[str, float], lines: Sequence[tuple[float, float]]
+    sensors: Mapping[str, Sensor],
+    sample_rate_hz: Mapping[str, float],
+    lines: Sequence[tuple[float, float]],
+    *,
+    coloured: bool = False,
 ) -> Optimum | None:
     """Return the best settled filter of a signal for these very sensors, None if one of them has no rational model.
+
+    With white noise only it is a bound for any run; 1/f and bias noise build up within minutes, so that a short run may stay below a bound
+    that has them.
 
     Parameters
     ----------
@@ -120,11 +127,31 @@ def signal_optimum(
         Rate of each [Hz].
     lines : sequence of (float, float)
         Frequency [Hz] and amplitude [rad/s] of each line of the signal.
+    coloured : bool, optional
+        Count the sensors' noise beyond its white part too, which the filters do not know of.
     """
     belief: dict[str, SensorBelief] = {}
+    excess: dict[str, Callable[[FloatArray], FloatArray]] = {}
     for name, sensor in sensors.items():
         one = believed(sensor)
         if one is None:
             return None
         belief[name] = one
-    return optimum(belief, sample_rate_hz, lines)
+        if coloured:
+            excess[name] = _excess(sensor, one)
+    return optimum(belief, sample_rate_hz, lines, excess=excess)
+
+
+def _excess(sensor: Sensor, belief: SensorBelief) -> Callable[[FloatArray], FloatArray]:
+    """Return the density of the reading beyond the belief's white noise, Hz -> rad^2/s."""
+
+    def density(freq_hz: FloatArray) -> FloatArray:
+        power = np.abs(sensor.response(freq_hz)) ** 2
+        beyond = sensor.input_noise_psd(freq_hz) * power - belief.input_noise**2 * power - belief.output_noise**2
+        # Below 2 % it is the misfit of the white level.
+        kept: FloatArray = np.where(
+            beyond > 0.02 * (belief.input_noise**2 * power + belief.output_noise**2), beyond, 0.0
+        )
+        return kept
+
+    return density

@@ -84,7 +84,9 @@ class Judge:
             return None
         from testbed.budget import signal_optimum
 
-        best = signal_optimum(self._scenario.sensors, {name: self._rates[name] for name in self._scenario.sensors}, lines)
+        best = signal_optimum(
+            self._scenario.sensors, {name: self._rates[name] for name in self._scenario.sensors}, lines
+        )
         return None if best is None else float(np.rad2deg(best.rmse))
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:

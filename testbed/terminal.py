@@ -116,8 +116,8 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
     rmse = row["rmse_deg_s"]
     gains = {line["frequency_hz"]: line for line in row["lines"]}
     cells = [name, _number(rmse), _number(row["rmse_aligned_deg_s"]), _number(row.get("mean_std_deg_s"))]
-    for bound in (row.get("floor_rmse_deg_s"), row.get("optimum_rmse_deg_s")):
-        cells.append("-" if not bound or rmse is None else f"{rmse / bound:.1f}")
+    bounds = row.get("floor_rmse_deg_s"), row.get("optimum_rmse_deg_s")
+    cells += ["-" if not bound or rmse is None else f"{rmse / bound:.1f}" for bound in bounds]
     for line in shown:
         entry = gains[line]
         cells.append("-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg")

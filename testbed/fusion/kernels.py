@@ -173,7 +173,7 @@ def kalman_kernel(n: int, n_sensor: int) -> Any:
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # pragma: no cover
+def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912  # pragma: no cover
     """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
 
     A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double precision.
@@ -312,7 +312,7 @@ def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # pragma: no cover
+    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912  # pragma: no cover
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))

@@ -15,13 +15,15 @@ import numpy as np
 from testbed.fusion.model import FusionModel, build_model
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import ComplexArray, FloatArray
 
 # Decades of q [rad^2/s^(2m+1)] that are searched, per order m: from a filter slower than the crossover of the sensors to one beyond 1 kHz.
 DECADES = {1: (-10, 4), 2: (-8, 12), 3: (-6, 17)}
+# Where noise beyond the model's is looked for: 1/f is above the white noise below some hertz only.
+_COLOURED_HZ = np.logspace(-5.0, 2.0, 71)
 # 2^40 periods are past any time constant.
 _DOUBLINGS = 40
 
@@ -84,7 +86,20 @@ class FixedFilters:
         return np.array(parts)
 
     def line_error(self, freq_hz: FloatArray, responses: ComplexArray) -> FloatArray:
-        r"""Return rms over the cycle of |estimate/truth - 1| for a settled sine [-], shape (n_q, n_freq).
+        """Return rms over the cycle of |estimate/truth - 1| for a settled sine [-], shape (n_q, n_freq).
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequencies [Hz].
+        responses : ndarray of complex, shape (n_sensor, n_freq)
+            What the sensors truly do, G [-].
+        """
+        error: FloatArray = np.sqrt(np.mean(np.abs(self.gain(freq_hz, responses) - 1.0) ** 2, axis=0))
+        return error
+
+    def gain(self, freq_hz: FloatArray, responses: ComplexArray) -> ComplexArray:
+        r"""Return estimate over truth for a settled sine at each step of the cycle [-], shape (n_step, n_q, n_freq).
 
         .. math:: X_p = e^{-j w T} (I - K_p H) F X_{p-1} + K_p G(j w)
 
@@ -93,7 +108,7 @@ class FixedFilters:
         freq_hz : ndarray, shape (n_freq,)
             Frequencies [Hz].
         responses : ndarray of complex, shape (n_sensor, n_freq)
-            What the sensors truly do, G [-].
+            Readings over truth, G [-].
         """
         model, steps, n = self.model, len(self.K), self.model.F.shape[0]
         turn = np.exp(-2j * np.pi * np.asarray(freq_hz) / model.sample_rate_hz)
@@ -106,11 +121,33 @@ class FixedFilters:
             X = turn[:, None] * (X @ _t(M[p])) + driven[p]
         system = np.eye(n) - (turn**steps)[None, :, None, None] * around[:, None]
         X = np.linalg.solve(system, X[..., None])[..., 0]
-        square = np.zeros(X.shape[:2])
+        gains = []
         for p in range(steps):
             X = turn[:, None] * (X @ _t(M[p])) + driven[p]
-            square += np.abs(X[..., 0] - 1.0) ** 2
-        return np.sqrt(square / steps)
+            gains.append(X[..., 0])
+        return np.array(gains)
+
+    def coloured_variance(self, excess: Sequence[Callable[[FloatArray], FloatArray] | None]) -> FloatArray:
+        r"""Return the error variance from noise on the readings that the model does not have [rad^2/s^2], shape (n_sensor, n_q).
+
+        .. math:: 2 \int |T_i(f)|^2 S_i(f) df
+
+        with T_i from the reading of sensor i to the estimate; trapezoid in ln f, 1e-5 to 100 Hz, taken as constant below.
+
+        Parameters
+        ----------
+        excess : sequence of callable or None
+            Two-sided density S of each sensor's reading beyond the model's white noise, Hz -> rad^2/s; None for none.
+        """
+        variance = np.zeros((len(excess), self.q.size))
+        for i, psd in enumerate(excess):
+            if psd is not None:
+                only = np.zeros((len(excess), _COLOURED_HZ.size), complex)
+                only[i] = 1.0
+                passed = np.mean(np.abs(self.gain(_COLOURED_HZ, only)) ** 2, axis=0) * psd(_COLOURED_HZ)
+                tail = passed[:, 0] * _COLOURED_HZ[0]
+                variance[i] = 2.0 * (np.trapezoid(passed * _COLOURED_HZ, np.log(_COLOURED_HZ), axis=1) + tail)
+        return variance
 
 
 def settled_filters(
@@ -230,6 +267,7 @@ def optimum(
     sample_rate_hz: Mapping[str, float],
     lines: Sequence[tuple[float, float]],
     *,
+    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
 ) -> Optimum:
     r"""Return the fixed filter with the smallest error for a signal made of lines, sensor models exact, after all time constants.
@@ -246,6 +284,8 @@ def optimum(
         Rate of each sensor [Hz].
     lines : sequence of (float, float)
         Frequency [Hz] and amplitude [rad/s] of each line.
+    excess : mapping of str to callable, optional
+        Density of a sensor's reading beyond the belief's white noise (1/f), Hz -> rad^2/s; the filters do not know of it.
     orders : sequence of int, optional
         Orders of the signal model.
 
@@ -260,13 +300,17 @@ def optimum(
     best: Optimum | None = None
     for order in orders:
         low, high = DECADES[order]
-        filters = settled_filters(belief, sample_rate_hz, order=order, q=10.0 ** np.arange(low, high + 1))
-        shares = filters.noise_variance()
+        filters = settled_filters(belief, sample_rate_hz, order=order, q=np.logspace(low, high, high - low + 1))
+        shares = filters.noise_variance() + filters.coloured_variance(
+            [(excess or {}).get(name) for name in sample_rate_hz]
+        )
         noise, lag = shares.sum(axis=0), filters.line_error(freq, truth) ** 2 @ power
         i = int(np.argmin(noise + lag))
         rmse = float(np.sqrt(noise[i] + lag[i]))
         if best is None or rmse < best.rmse:
             by_sensor = dict(zip(filters.model.sensors, np.sqrt(shares[:, i]).tolist(), strict=True))
-            best = Optimum(rmse, float(np.sqrt(noise[i])), float(np.sqrt(lag[i])), order, float(filters.q[i]), by_sensor)
+            best = Optimum(
+                rmse, float(np.sqrt(noise[i])), float(np.sqrt(lag[i])), order, float(filters.q[i]), by_sensor
+            )
     assert best is not None
     return best

@@ -55,7 +55,12 @@ def test_a_sensor_blind_at_dc_stays_blind() -> None:
 
 @pytest.mark.parametrize(
     ("freq", "response"),
-    [(FREQ[:3], np.ones(3)), (FREQ, np.zeros(FREQ.size)), (FREQ, np.full(FREQ.size, np.nan)), (FREQ - 0.01, np.ones(FREQ.size))],
+    [
+        (FREQ[:3], np.ones(3)),
+        (FREQ, np.zeros(FREQ.size)),
+        (FREQ, np.full(FREQ.size, np.nan)),
+        (FREQ - 0.01, np.ones(FREQ.size)),
+    ],
     ids=["too few", "zero", "nan", "dc"],
 )
 def test_samples_that_cannot_be_fitted_are_refused(freq: np.ndarray, response: np.ndarray) -> None:

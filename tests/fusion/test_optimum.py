@@ -43,7 +43,9 @@ def test_cycle_starts_at_the_lifted_riccati_solution() -> None:
 def test_running_filter_converges_to_the_cycle(order: int) -> None:
     """The fast part of the covariance settles in a second where the gyro is as good as the MHD sensor: the crossover is at 75 rad/s, not at 0.04."""
     belief = dict(load_belief("eq39"))
-    belief["mems_gyro"] = SensorBelief(numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8)
+    belief["mems_gyro"] = SensorBelief(
+        numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8
+    )
     q = {1: 0.3 * DEG**2, 3: 1e10 * DEG**2}[order]
     block = Kalman(belief, RATES, KalmanParameters(order=order, q=q)).process(
         {"mems_gyro": np.zeros(2000), "mhd_ars": np.zeros(20000)}
@@ -58,7 +60,9 @@ def test_running_filter_converges_to_the_cycle(order: int) -> None:
 def test_closed_form_is_what_the_fixed_filter_does(reference: Any) -> None:
     """Monte Carlo: 400 runs of one settled filter on a 200 Hz sine; noise and lag apart, and each sensor's noise apart."""
     belief = dict(load_belief("eq39"))
-    belief["mems_gyro"] = SensorBelief(numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8)
+    belief["mems_gyro"] = SensorBelief(
+        numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8
+    )
     q = 1e12 * DEG**2
     fixed = settled_filters(belief, RATES, order=3, q=np.array([q]))
     model, runs, n_time = fixed.model, 400, 8000
@@ -110,6 +114,20 @@ def test_optimum_is_the_smallest_over_the_grid_and_rises_with_the_signal() -> No
     both = optimum(belief, RATES, [(10.0, DEG), (100.0, DEG)])
     assert louder.rmse > found[1].rmse
     assert both.rmse > found[2].rmse
+
+
+@pytest.mark.oracle
+def test_coloured_noise_that_is_white_is_the_white_noise() -> None:
+    """The density of the MHD readings, given as if it came on top, leaves what the model's own does: a filter of 1.6 Hz, q / n^2 = (10 rad/s)^2."""
+    belief = load_belief("identified")
+    fixed = settled_filters(belief, RATES, order=1, q=np.array([1e-12]))
+    mhd = belief["mhd_ars"].output_noise ** 2
+    found = fixed.coloured_variance([None, lambda freq: np.full(freq.shape, mhd)])
+    assert found[0, 0] == 0.0
+    # Ten points per decade of a crossover of first order: 1 %; what passes above 100 Hz: less.
+    assert found[1, 0] == pytest.approx(fixed.noise_variance()[1, 0], rel=0.02, abs=0.0)
+    more = optimum(belief, RATES, [(1.0, DEG)], excess={"mhd_ars": lambda freq: mhd * 0.1 / freq})
+    assert more.rmse > optimum(belief, RATES, [(1.0, DEG)]).rmse
 
 
 def test_a_sensor_without_output_noise_is_refused() -> None:

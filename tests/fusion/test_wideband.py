@@ -151,7 +151,7 @@ def test_without_the_gate_a_spike_gets_through(reference: Any) -> None:
     """The other way round: the test above sees what the gate does."""
     rate = reference.sines((4.0, 1.0), duration=1.2)
     readings = reference.readings(rate, 7)
-    through = run(spoilt(readings | {}, "spike") , gate=1e6)
+    through = run(spoilt(readings | {}, "spike"), gate=1e6)
     assert np.max(np.abs(through.rate - rate)[20_000:]) > 1.0 * DEG
 
 
