@@ -172,6 +172,56 @@ def kalman_kernel(n: int, n_sensor: int) -> Any:
     return run
 
 
+@functools.lru_cache
+def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
+    """Return run(x, P, F, Q, H, K, settled, Z, progress, out), a filter of settled gains over a block.
+
+    K (n_step, n, n_sensor) and `settled` (n_step, n, n), the covariance after the readings, repeat; `progress` = [started, step].
+    P follows `settled` while readings come, and grows by F P F' + Q while none does. `out` as in `kalman_kernel`, its variances NaN.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, K, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
+        x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H = np.empty((n_sensor, n))
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        for k in range(Z.shape[1]):
+            read = False
+            for i in range(n_sensor):
+                read = read or np.isfinite(Z[i, k])
+            if progress[0] > 0 and read:
+                for i in range(n):
+                    moved[i] = 0.0
+                    for j in range(n):
+                        moved[i] += F[i, j] * x[j]
+                x[:] = moved
+            elif progress[0] > 0:
+                predict(x, P, F, Q, work, moved, n)
+            for i in range(n_sensor):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                e[i] = np.nan
+                if np.isfinite(Z[i, k]):
+                    e[i] = Z[i, k]
+                    for j in range(n):
+                        e[i] -= H[i, j] * x[j]
+                out[row + INNOVATION, k] = e[i]
+                out[row + INNOVATION_VARIANCE, k] = np.nan
+            for i in range(n_sensor):
+                if np.isfinite(e[i]):
+                    for j in range(n):
+                        x[j] += K[progress[1], j, i] * e[i]
+            if read:
+                progress[0] = 1
+                P[:] = settled[progress[1]]
+            progress[1] = (progress[1] + 1) % len(K)
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(P[0, 0])
+        x_in[:], P_in[:] = x, P
+
+    return run
+
+
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912  # pragma: no cover
     """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.

@@ -52,10 +52,14 @@ class FixedFilters:
     @property
     def std(self) -> FloatArray:
         """What each filter claims: the mean over the cycle of its settled standard deviation [rad/s], shape (n_q,)."""
-        H = self.model.H
-        post = self.prior - self.K @ (H @ self.prior)
-        std: FloatArray = np.sqrt(post[:, :, 0, 0].mean(axis=0))
+        std: FloatArray = np.sqrt(self.posterior()[:, :, 0, 0].mean(axis=0))
         return std
+
+    def posterior(self) -> FloatArray:
+        """Return the covariance after the readings of each step [rad^2/s^2], shape (n_step, n_q, n_state, n_state)."""
+        keep = np.eye(self.model.F.shape[0]) - self.K @ self.model.H
+        post: FloatArray = keep @ self.prior @ _t(keep) + (self.K * self.model.R) @ _t(self.K)
+        return post
 
     def noise_variance(self) -> FloatArray:
         r"""Return the error variance that each sensor's noise causes [rad^2/s^2], shape (n_sensor, n_q), mean over the cycle.
@@ -196,8 +200,7 @@ def settled_filters(
         prior.append(P)
         gains.append(K)
         keep = np.eye(len(model.F)) - K @ model.H
-        post = keep @ P @ _t(keep) + (K * model.R) @ _t(K)
-        P = model.F @ post @ model.F.T + Q
+        P = model.F @ (keep @ P @ _t(keep) + (K * model.R) @ _t(K)) @ model.F.T + Q
     return FixedFilters(model, np.asarray(q, float), np.array(prior), np.array(gains))
 
 
