@@ -69,7 +69,7 @@ def _plain(name: str, duration: float) -> Callable[[float], None]:
 def _console() -> Console:
     console = Console()
     # Without a terminal there is no width to respect: a log keeps whole lines.
-    return console if console.is_terminal else Console(width=160)
+    return console if console.is_terminal else Console(width=180)
 
 
 def _number(value: float | None) -> str:

@@ -174,14 +174,15 @@ def kalman_kernel(n: int, n_sensor: int) -> Any:
 
 @functools.lru_cache
 def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
-    """Return run(x, P, F, Q, H, K, settled, Z, progress, out), a filter of settled gains over a block.
+    """Return run(x, P, F, Q, H, K, C, settled, Z, progress, out), a filter of settled gains over a block.
 
-    K (n_step, n, n_sensor) and `settled` (n_step, n, n), the covariance after the readings, repeat; `progress` = [started, step].
-    P follows `settled` while readings come, and grows by F P F' + Q while none does. `out` as in `kalman_kernel`, its variances NaN.
+    K (n_step, n, n_sensor), C (n_step, n_sensor), the variance of an innovation, and `settled` (n_step, n, n), the covariance after the
+    readings, repeat; `progress` = [started, step]. P follows `settled` while readings come, and grows by F P F' + Q while none does.
+    `out` as in `kalman_kernel`.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, K, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
         x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H = np.empty((n_sensor, n))
@@ -206,7 +207,7 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
                     for j in range(n):
                         e[i] -= H[i, j] * x[j]
                 out[row + INNOVATION, k] = e[i]
-                out[row + INNOVATION_VARIANCE, k] = np.nan
+                out[row + INNOVATION_VARIANCE, k] = C[progress[1], i] if np.isfinite(e[i]) else np.nan
             for i in range(n_sensor):
                 if np.isfinite(e[i]):
                     for j in range(n):

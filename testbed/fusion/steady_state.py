@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from testbed.fusion.base import BlockFilter, EstimateBlock, FilterParameters
-from testbed.fusion.kernels import HEADER_ROWS, INNOVATION, INNOVATION_ROWS, RATE, STD, fixed_gain_kernel
+from testbed.fusion.kernels import (
+    HEADER_ROWS,
+    INNOVATION,
+    INNOVATION_ROWS,
+    INNOVATION_VARIANCE,
+    RATE,
+    STD,
+    fixed_gain_kernel,
+)
 from testbed.fusion.optimum import optimum, settled_filters
 from testbed.parts import Part
 from testbed.units import Frequency, Range
@@ -69,6 +77,7 @@ class SteadyState(BlockFilter):
         super().__init__(belief, sample_rate_hz, FilterParameters(order=best.order, q=best.q))
         fixed = settled_filters(belief, sample_rate_hz, order=best.order, q=np.array([best.q]))
         self._K = np.ascontiguousarray(fixed.K[:, 0])
+        self._C = np.einsum("ij,pjk,ik->pi", self.model.H, fixed.prior[:, 0], self.model.H) + self.model.R
         self._settled = np.ascontiguousarray(fixed.posterior()[:, 0])
         self._progress = np.zeros(2, dtype=np.int64)
         self._run = fixed_gain_kernel(self._x.size, len(self.model.H))
@@ -94,9 +103,11 @@ class SteadyState(BlockFilter):
         Z = self.spread(readings)
         out = np.empty((HEADER_ROWS + INNOVATION_ROWS * len(Z), Z.shape[1]))
         model = self.model
-        self._run(self._x, self._P, model.F, model.Q, model.H, self._K, self._settled, Z, self._progress, out)
-        innovations = {
-            f"innovation_{name}": out[HEADER_ROWS + INNOVATION_ROWS * i + INNOVATION]
-            for i, name in enumerate(model.sensors)
-        }
-        return EstimateBlock(out[RATE], out[STD], innovations)
+        gains = (self._K, self._C, self._settled)
+        self._run(self._x, self._P, model.F, model.Q, model.H, *gains, Z, self._progress, out)
+        diagnostics = {}
+        for i, name in enumerate(model.sensors):
+            row = HEADER_ROWS + INNOVATION_ROWS * i
+            diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
+            diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
+        return EstimateBlock(out[RATE], out[STD], diagnostics)

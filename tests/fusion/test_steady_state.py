@@ -33,6 +33,8 @@ def test_it_is_the_kalman_filter_once_that_has_settled() -> None:
         fixed.rate[-5000:], kalman.rate[-5000:], rtol=0.0, atol=1e-7 * np.max(np.abs(kalman.rate))
     )
     np.testing.assert_allclose(fixed.std[-5000:], kalman.std[-5000:], rtol=1e-5)
+    for key in ("innovation_variance_mhd_ars", "innovation_variance_mems_gyro"):
+        np.testing.assert_allclose(fixed.diagnostics[key][-5000:], kalman.diagnostics[key][-5000:], rtol=1e-5)
 
 
 def test_it_is_best_at_the_signal_it_was_made_for(reference: Any) -> None:
