@@ -107,13 +107,44 @@ def test_optimum_is_the_smallest_over_the_grid_and_rises_with_the_signal() -> No
     for one in found:
         assert one.rmse == pytest.approx(np.hypot(one.noise, one.lag), rel=1e-12, abs=0.0)
         assert one.noise == pytest.approx(np.sqrt(sum(share**2 for share in one.shares.values())), rel=1e-12, abs=0.0)
+        fixed = settled_filters(belief, RATES, order=one.order, q=np.array([one.q]))
+        assert one.noise == pytest.approx(np.sqrt(fixed.noise_variance().sum()), rel=1e-6, abs=0.0)
         # The grid does not end where the best one lies.
         low, high = DECADES[one.order]
         assert low < np.log10(one.q) < high
+    # rms of a sine of 1 deg/s times the filter's relative error.
+    freq = np.array([300.0])
+    truth = np.array([belief[name].realisation().response(freq) for name in RATES])
+    assert found[-1].lag == pytest.approx(DEG / np.sqrt(2.0) * fixed.line_error(freq, truth)[0, 0], rel=1e-6, abs=0.0)
     louder = optimum(belief, RATES, [(10.0, 10.0 * DEG)])
     both = optimum(belief, RATES, [(10.0, DEG), (100.0, DEG)])
     assert louder.rmse > found[1].rmse
     assert both.rmse > found[2].rmse
+
+
+@pytest.mark.oracle
+def test_noise_variance_is_that_of_truth_and_filter_together() -> None:
+    """Covariance of [true states, filter states] under one sensor's noise, step by step: no error equation, no doubling."""
+    belief = dict(load_belief("eq39"))
+    belief["mems_gyro"] = SensorBelief(
+        numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8
+    )
+    fixed = settled_filters(belief, RATES, order=3, q=np.array([1e12 * DEG**2]))
+    model, n = fixed.model, len(fixed.model.F)
+    for i, states in enumerate((slice(3, n - 2), slice(n - 2, n))):
+        noise = np.zeros((2 * n, 2 * n))
+        noise[states, states] = model.Q[states, states]
+        joint, last = np.zeros((2 * n, 2 * n)), []
+        for k in range(10_000):
+            K = fixed.K[k % 10, 0]
+            move = block_diag(model.F, model.F)
+            learn = np.block([[np.eye(n), np.zeros((n, n))], [K @ model.H, np.eye(n) - K @ model.H]])
+            on_reading = np.concatenate([np.zeros(n), K[:, i]])
+            joint = learn @ (move @ joint @ move.T + noise) @ learn.T + model.R[i] * np.outer(on_reading, on_reading)
+            if k >= 9_990:
+                last.append(joint[n, n])
+        # The true rate is zero; the slowest mode, 75 rad/s, is down by e^-75 in variance.
+        assert np.mean(last) == pytest.approx(fixed.noise_variance()[i, 0], rel=1e-6, abs=0.0)
 
 
 @pytest.mark.oracle
