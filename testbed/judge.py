@@ -58,13 +58,14 @@ class Judge:
         psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
         floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
         floor_deg = None if floor is None else float(np.rad2deg(floor))
+        optimum_deg = None if floor is None else self._optimum()
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 "floor_rmse_deg_s": floor_deg,
-                "optimum_rmse_deg_s": None,
+                "optimum_rmse_deg_s": optimum_deg,
             }
             for name in self._scenario.fusion
         }
@@ -80,6 +81,19 @@ class Judge:
             "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
         }
+
+    def _optimum(self) -> float | None:
+        """Return what the best fixed filter of this very signal leaves [deg/s]: one value for all filters, None without lines."""
+        lines = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
+        # A table that does not move has no lines in its truth, only arithmetic noise.
+        if not any(amplitude > np.deg2rad(1e-9) for _, amplitude in lines):
+            return None
+        from testbed.budget import signal_optimum
+
+        best = signal_optimum(
+            self._scenario.sensors, {name: self._rates[name] for name in self._scenario.sensors}, lines
+        )
+        return None if best is None else float(np.rad2deg(best.rmse))
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
         rows = []

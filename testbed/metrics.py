@@ -115,6 +115,12 @@ class ErrorMetrics:
             "inside_2_std": self._inside / self._n,
         }
 
+    def truth_lines(self) -> list[tuple[float, float]]:
+        """Return frequency [Hz] and amplitude [rad/s] of the commanded lines in the truth; none without samples or lines."""
+        if not self._n:
+            return []
+        return [(line, amplitude) for line, (amplitude, _) in zip(self._lines, self._gains(), strict=True)]
+
     def _gains(self) -> list[tuple[float, complex | None]]:
         """Return amplitude of the truth and complex gain estimate/truth of each line."""
         if not self._lines:

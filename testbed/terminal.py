@@ -72,7 +72,7 @@ def _plain(name: str, duration: float) -> Callable[[float], None]:
 def _console() -> Console:
     console = Console()
     # Without a terminal there is no width to respect: a log keeps whole lines.
-    return console if console.is_terminal else Console(width=160)
+    return console if console.is_terminal else Console(width=180)
 
 
 def _number(value: float | None) -> str:
@@ -99,6 +99,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         "aligned deg/s",
         "claimed std deg/s",
         "x floor",
+        "x optimum",
         *(f"{line:g} Hz gain, phase" for line in shown),
     ):
         table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
@@ -148,10 +149,11 @@ def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
-    floor, rmse = row.get("floor_rmse_deg_s"), row["rmse_deg_s"]
+    rmse = row["rmse_deg_s"]
     gains = {line["frequency_hz"]: line for line in row["lines"]}
     cells = [name, _number(rmse), _number(row["rmse_aligned_deg_s"]), _number(row.get("mean_std_deg_s"))]
-    cells.append("-" if not floor or rmse is None else f"{rmse / floor:.1f}")
+    bounds = row.get("floor_rmse_deg_s"), row.get("optimum_rmse_deg_s")
+    cells += ["-" if not bound or rmse is None else f"{rmse / bound:.1f}" for bound in bounds]
     for line in shown:
         entry = gains[line]
         cells.append("-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg")

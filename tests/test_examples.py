@@ -33,3 +33,18 @@ def test_calibration_sweep_leaves_the_judged_signals_out():
     assert not set(sweep) & {0.5, 4.0, 10.0}
     assert sweep[0] == 0.1
     assert sweep[-1] == 25.0
+
+
+def test_identified_belief_is_what_the_example_writes():
+    """The file keeps nine digits; the search itself repeats to far less than the misfit of 1e-4, on which the filters depend."""
+    from testbed.fusion.belief import load_belief
+
+    program = example("identify_beliefs")
+    shipped, freq = load_belief("identified"), program.FREQ_HZ
+    for name, fit in program.identified().items():
+        assert np.allclose(
+            shipped[name].realisation().response(freq), fit.belief().realisation().response(freq), rtol=1e-6, atol=0.0
+        ), name
+        assert fit.worst < 2e-4
+        for key, (value, _) in program.NOISE[name].items():
+            assert f"  {key}: {value}" in program.belief_file()

@@ -21,6 +21,8 @@ FILTERS = {
     "shakf": "testbed.fusion.shakf:Shakf",
     "arw_shakf": "testbed.fusion.arw_shakf:ArwShakf",
     "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
+    "steady_state": "testbed.fusion.steady_state:SteadyState",
+    "wideband": "testbed.fusion.wideband:Wideband",
 }
 
 

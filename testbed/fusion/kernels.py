@@ -21,6 +21,13 @@ from numba import njit
 # Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
 RATE, STD, HEADER_ROWS = 0, 1, 2
 INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
+# Rows of the output of `bank_kernel`; then BANK_ROWS per sensor, the first two as above.
+LEVEL, BANK_HEADER_ROWS = 2, 3
+REFUSED, BANK_ROWS = 2, 3
+# A reading beyond this [rad/s] is no rate, whatever the gate says: it would overflow the derivatives of the rate.
+LARGEST_RATE = 1e6
+# Beyond this [rad^2/s^2] a filter of the bank knows nothing of the rate.
+LOST_VARIANCE = 1.0
 # Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
 Q_RATE, GUARD_HITS, ADAPTIVE_HEADER_ROWS = 2, 3, 4
 R_USED, INCREMENTS, BAND, INFLATION, ADAPTIVE_ROWS = 2, 3, 4, 5, 6
@@ -161,6 +168,254 @@ def kalman_kernel(n: int, n_sensor: int) -> Any:
             out[STD, k] = np.sqrt(P[0, 0])
         x_in[:], P_in[:] = x, P
         return started
+
+    return run
+
+
+@functools.lru_cache
+def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
+    """Return run(x, P, F, Q, H, K, C, settled, Z, progress, out), a filter of settled gains over a block.
+
+    K (n_step, n, n_sensor), C (n_step, n_sensor), the variance of an innovation, and `settled` (n_step, n, n), the covariance after the
+    readings, repeat; `progress` = [started, step]. P follows `settled` while readings come, and grows by F P F' + Q while none does.
+    `out` as in `kalman_kernel`.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
+        x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H = np.empty((n_sensor, n))
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        for k in range(Z.shape[1]):
+            read = False
+            for i in range(n_sensor):
+                read = read or np.isfinite(Z[i, k])
+            if progress[0] > 0 and read:
+                for i in range(n):
+                    moved[i] = 0.0
+                    for j in range(n):
+                        moved[i] += F[i, j] * x[j]
+                x[:] = moved
+            elif progress[0] > 0:
+                predict(x, P, F, Q, work, moved, n)
+            for i in range(n_sensor):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                e[i] = np.nan
+                if np.isfinite(Z[i, k]):
+                    e[i] = Z[i, k]
+                    for j in range(n):
+                        e[i] -= H[i, j] * x[j]
+                out[row + INNOVATION, k] = e[i]
+                out[row + INNOVATION_VARIANCE, k] = C[progress[1], i] if np.isfinite(e[i]) else np.nan
+            for i in range(n_sensor):
+                if np.isfinite(e[i]):
+                    for j in range(n):
+                        x[j] += K[progress[1], j, i] * e[i]
+            if read:
+                progress[0] = 1
+                P[:] = settled[progress[1]]
+            progress[1] = (progress[1] + 1) % len(K)
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(P[0, 0])
+        x_in[:], P_in[:] = x, P
+
+    return run
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
+
+    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double precision.
+    """
+    for m in range(M):
+        lost[m] = P[0, 0, m] > LOST_VARIANCE
+    for i in range(n):
+        for m in range(M):
+            moved[i, m] = 0.0
+            for j in range(n):
+                work[i, j, m] = 0.0
+        for s in range(nonzero[i, n]):
+            k = nonzero[i, s]
+            factor = F[i, k]
+            for m in range(M):
+                moved[i, m] += factor * x[k, m]
+            for j in range(n):
+                for m in range(M):
+                    work[i, j, m] += factor * P[k, j, m]
+    for i in range(n):
+        for m in range(M):
+            x[i, m] = x[i, m] if lost[m] else moved[i, m]
+        for j in range(i + 1):
+            for m in range(M):
+                moved[i, m] = Q[i, j, m]
+            for s in range(nonzero[j, n]):
+                k = nonzero[j, s]
+                factor = F[j, k]
+                for m in range(M):
+                    moved[i, m] += factor * work[i, k, m]
+            for m in range(M):
+                P[i, j, m] = P[i, j, m] if lost[m] else moved[i, m]
+                P[j, i, m] = P[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovate_bank(x, P, h, seen, z, e, spread, g, n, M):  # pragma: no cover
+    """Set e = z - h x, g = P h' and spread = h P h' of each of M filters; `seen` lists where h is not zero."""
+    for m in range(M):
+        e[m] = z
+        spread[m] = 0.0
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = 0.0
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += P[j, k, m] * h[k]
+    for s in range(seen[n]):
+        k = seen[s]
+        for m in range(M):
+            e[m] -= h[k] * x[k, m]
+            spread[m] += h[k] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_bank` to M filters, in the Joseph form of `update`."""
+    for j in range(n):
+        for m in range(M):
+            K[j, m] = g[j, m] / (spread[m] + R)
+            x[j, m] += K[j, m] * e[m]
+    for j in range(n):
+        for k in range(n):
+            for m in range(M):
+                P[j, k, m] -= K[j, m] * g[k, m]
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = -R * K[j, m]
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += P[j, k, m] * h[k]
+    for j in range(n):
+        for k in range(j + 1):
+            for m in range(M):
+                P[j, k, m] -= g[j, m] * K[k, m]
+                P[k, j, m] = P[j, k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def admit(watch, z, smallest, gate, patience, stuck_after):  # pragma: no cover
+    """Return whether a reading is to be used; `watch` = [last reading, equal ones before it, refused in a row, refused so far].
+
+    `smallest` is its innovation over the standard deviation, in the filter that finds it least surprising.
+    """
+    if abs(z) > LARGEST_RATE:
+        watch[3] += 1.0
+        return False
+    watch[1] = watch[1] + 1.0 if z == watch[0] else 0.0
+    watch[0] = z
+    stuck = stuck_after > 0 and watch[1] >= stuck_after
+    if smallest <= gate:
+        watch[2] = 0.0
+    else:
+        watch[2] += 1.0
+    # A signal that truly jumped stays outside the gate; a spike does not.
+    if stuck or 0.0 < watch[2] <= patience:
+        watch[3] += 1.0
+        return False
+    return True
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def log_likelihood(e, C, gate):  # pragma: no cover
+    """Return -(ln C + e^2/C)/2, where e^2/C beyond gate^2 grows by its logarithm only: one reading never decides for long."""
+    ratio = abs(e) / np.sqrt(C)
+    nis = ratio * ratio
+    if ratio > gate:
+        nis = gate * gate * (1.0 + 2.0 * np.log(ratio / gate))
+    return -0.5 * (nis + np.log(C))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def weigh(score, weight, M):  # pragma: no cover
+    """Set `weight` = exp(score) / sum, the largest score taken off first; return nothing."""
+    top = score[0]
+    for m in range(1, M):
+        top = max(top, score[m])
+    total = 0.0
+    for m in range(M):
+        score[m] -= top
+        weight[m] = np.exp(score[m])
+        total += weight[m]
+    for m in range(M):
+        weight[m] /= total
+
+
+@functools.lru_cache
+def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
+    """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters over a block.
+
+    They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M). `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the
+    columns of F and H that are not zero, their number last. `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 4) as
+    in `admit`, `setting` = [started, forget, gate, patience, stuck_after], `levels` (M,) what the weights average into the row LEVEL.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912  # pragma: no cover
+        x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
+        P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, n, M))
+        F, H = np.empty((n, n)), np.empty((n_sensor, n))
+        e, spread, weight = np.empty(M), np.empty(M), np.empty(M)
+        used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
+        x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
+        forget, gate, patience, stuck_after = setting[1], setting[2], setting[3], setting[4]
+        weigh(score, weight, M)
+        for k in range(Z.shape[1]):
+            if setting[0] > 0.0:
+                predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M)
+            informed = False
+            for i in range(n_sensor):
+                row = BANK_HEADER_ROWS + BANK_ROWS * i
+                out[row + INNOVATION, k] = np.nan
+                out[row + INNOVATION_VARIANCE, k] = np.nan
+                used[i] = False
+                if np.isfinite(Z[i, k]):
+                    innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    mean, smallest = 0.0, np.inf
+                    for m in range(M):
+                        mean += weight[m] * e[m]
+                        smallest = min(smallest, abs(e[m]) / np.sqrt(spread[m] + R[i]))
+                    variance = R[i]
+                    for m in range(M):
+                        variance += weight[m] * (spread[m] + (e[m] - mean) ** 2)
+                    out[row + INNOVATION, k] = mean
+                    out[row + INNOVATION_VARIANCE, k] = variance
+                    used[i] = admit(watch[i], Z[i, k], smallest, gate, patience, stuck_after)
+                    informed = informed or used[i]
+                out[row + REFUSED, k] = watch[i, 3]
+            if informed:
+                setting[0] = 1.0
+                for m in range(M):
+                    score[m] *= forget
+                for i in range(n_sensor):
+                    if used[i]:
+                        innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        for m in range(M):
+                            score[m] += log_likelihood(e[m], spread[m] + R[i], gate)
+                        update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                weigh(score, weight, M)
+            rate, variance, level = 0.0, 0.0, 0.0
+            for m in range(M):
+                rate += weight[m] * x[0, m]
+                level += weight[m] * levels[m]
+            for m in range(M):
+                variance += weight[m] * (P[0, 0, m] + (x[0, m] - rate) ** 2)
+            out[RATE, k] = rate
+            out[STD, k] = np.sqrt(variance)
+            out[LEVEL, k] = level
+        x_in[:], P_in[:] = x, P
 
     return run
 

@@ -81,17 +81,21 @@ def test_read_only_inputs_and_an_empty_block_are_fine(name: str, readings: dict[
 
 
 def test_missing_readings_mean_predict_only(name: str, readings: dict[str, FloatArray]) -> None:
-    """Order 1 predicts the rate to stay; its variance grows by the q of the model at each step."""
+    """Order 1 predicts the rate to stay; its variance grows by the q of the model at each step. Any order's grows."""
     stage = _stage(name)
     stage.process(readings)
     lost = {"mems_gyro": np.full(50, np.nan), "mhd_ars": np.full(493, np.inf)}
     block = stage.process({"mems_gyro": lost["mems_gyro"][:49], "mhd_ars": lost["mhd_ars"][:490]})
     assert np.all(np.isfinite(block.rate))
-    assert np.unique(block.rate).size == 1
-    np.testing.assert_allclose(np.diff(block.std**2), stage.model.Q[0, 0], rtol=1e-6)
+    assert np.all(np.diff(block.std) > 0.0)
+    if getattr(stage.Parameters(), "order", None) == 1:
+        assert np.unique(block.rate).size == 1
+        np.testing.assert_allclose(np.diff(block.std**2), stage.model.Q[0, 0], rtol=1e-6)
     for sensor in RATES:
         assert np.all(np.isnan(block.diagnostics[f"innovation_{sensor}"]))
-    after = stage.process({"mems_gyro": np.zeros(50), "mhd_ars": np.zeros(500)})
+    # Not all the same: that would be a stuck sensor.
+    quiet = 1e-5 * np.random.default_rng(1).standard_normal(500)
+    after = stage.process({"mems_gyro": quiet[::10], "mhd_ars": quiet})
     assert np.all(np.isfinite(after.rate))
     assert after.std[-1] < block.std[-1]
 
@@ -129,8 +133,9 @@ def test_estimate_runs_the_filter(name: str, readings: dict[str, FloatArray]) ->
     plain = {key: value.tolist() for key, value in readings.items()}
     assert _same(estimate(name, plain, sample_rate_hz=RATES), _stage(name).process(readings))
     assert _same(estimate(name, readings, sample_rate_hz=RATES, belief="eq39"), _stage(name).process(readings))
-    q = "0.02 (deg/s)^2/s"
-    assert _same(estimate(name, readings, sample_rate_hz=RATES, q=q), _stage(name, q=q).process(readings))
+    own = {"wideband": {"q": "1e5 (deg/s)^2/s^5"}, "steady_state": {"frequency": "20 Hz"}}
+    chosen = own.get(name, {"q": "0.02 (deg/s)^2/s"})
+    assert _same(estimate(name, readings, sample_rate_hz=RATES, **chosen), _stage(name, **chosen).process(readings))
     with pytest.raises(ValidationError, match="colour"):
         estimate(name, readings, sample_rate_hz=RATES, colour=1)
     with pytest.raises(UnknownNameError, match=f"did you mean '{name}'"):
@@ -155,4 +160,5 @@ def test_parameters_survive_a_yaml_round_trip(name: str) -> None:
     parameters = resolve("filter", name, FILTERS).Parameters()
     dumped = parameters.model_dump(mode="json", context={"border": True})
     assert type(parameters).model_validate(dumped, context={"border": True}) == parameters
-    assert type(parameters).model_json_schema()["properties"]["q"]["type"] == "string"
+    if hasattr(parameters, "q"):
+        assert type(parameters).model_json_schema()["properties"]["q"]["type"] == "string"

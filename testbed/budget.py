@@ -1,0 +1,157 @@
+"""Who sees what: the crossover of the sensors, their share in the noise floor by band, and the optimum of a signal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.fusion.identify import identify
+from testbed.fusion.optimum import Optimum, optimum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.sensors.base import Sensor
+    from testbed.signals import FloatArray
+
+_FIT_HZ = np.logspace(-2.0, 3.0, 121)
+_FIT_MISFIT = 1e-3
+# (real poles, pairs) in the order in which they are tried.
+_FORMS = ((1, 0), (2, 0), (0, 1), (3, 0), (1, 1), (4, 0), (2, 1))
+# An output noise this much below the input noise keeps R positive and changes nothing.
+_LEAST_OUTPUT = 3e-4
+
+
+def crossovers(
+    first: Callable[[FloatArray], FloatArray],
+    second: Callable[[FloatArray], FloatArray],
+    *,
+    low_hz: float = 1e-5,
+    high_hz: float = 1e3,
+) -> FloatArray:
+    """Return the frequencies [Hz] at which two sensors are equally good, shape (n_crossing,), rising; to 1e-4 of themselves.
+
+    Parameters
+    ----------
+    first, second : callable
+        Input-referred two-sided noise density, Hz -> rad^2/s.
+    low_hz, high_hz : float, optional
+        Where to look [Hz].
+    """
+    freq = np.logspace(np.log10(low_hz), np.log10(high_hz), 4001)
+    ratio = np.log(first(freq) / second(freq))
+    (at,) = np.nonzero(np.sign(ratio[1:]) != np.sign(ratio[:-1]))
+    part = ratio[at] / (ratio[at] - ratio[at + 1])
+    crossing: FloatArray = freq[at] * (freq[at + 1] / freq[at]) ** part
+    return crossing
+
+
+def noise_budget(
+    psds: Mapping[str, Callable[[FloatArray], FloatArray]], edges_hz: Sequence[float]
+) -> dict[str, FloatArray]:
+    r"""Return the variance that each sensor leaves in the best combination of all, band by band.
+
+    .. math:: \sigma_{i,b}^2 = 2 \int_b W_i^2 S_i df, \quad W_i = S_i^{-1} / \sum_j S_j^{-1}
+
+    All sensors and bands together are the square of `floor_rmse` between the outer edges. 400 points per band, trapezoid in ln f.
+
+    Parameters
+    ----------
+    psds : mapping of str to callable
+        Input-referred two-sided noise density of each sensor, Hz -> rad^2/s.
+    edges_hz : sequence of float
+        Edges of the bands [Hz], rising, above 0.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_band,)
+        Variance [rad^2/s^2].
+    """
+    edges = np.asarray(edges_hz, float)
+    if edges.size < 2 or edges[0] <= 0.0 or np.any(np.diff(edges) <= 0.0):
+        msg = f"edges_hz: expected at least two rising frequencies above 0 Hz, got {edges.tolist()}"
+        raise ValueError(msg)
+    freq = edges[:-1, None] * (edges[1:] / edges[:-1])[:, None] ** np.linspace(0.0, 1.0, 400)
+    information = {name: 1.0 / psd(freq.ravel()).reshape(freq.shape) for name, psd in psds.items()}
+    total = np.sum(list(information.values()), axis=0)
+    return {name: 2.0 * np.trapezoid(one / total**2 * freq, np.log(freq), axis=1) for name, one in information.items()}
+
+
+def believed(sensor: Sensor) -> SensorBelief | None:
+    """Return the rational model and white noise that come closest to what a sensor is, None if none is within 0.1 %.
+
+    The response is fitted from 0.01 Hz to 1 kHz by the fewest poles that do; the noise is an input and an output level, fitted to
+    the input-referred density from 1 Hz up (relative, non-negative): what rises below 1 Hz (1/f) is not in it.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The instrument.
+    """
+    from scipy.optimize import nnls
+
+    response = sensor.response(_FIT_HZ)
+    blind = bool(abs(sensor.response(_FIT_HZ[:1] / 10.0)[0]) < 0.5 * abs(response[0]))
+    band = _FIT_HZ >= 1.0
+    density = sensor.input_noise_psd(_FIT_HZ[band])
+    terms = np.stack([np.ones(density.size), 1.0 / np.abs(response[band]) ** 2], axis=1)
+    size = np.linalg.norm(terms / density[:, None], axis=0)
+    level, _ = nnls(terms / density[:, None] / size, np.ones(density.size))
+    inner, outer = np.sqrt(level / size)
+    for real, pairs in _FORMS:
+        fit = identify(_FIT_HZ, response, real_poles=real, pole_pairs=pairs, blind_at_dc=blind)
+        if fit.worst < _FIT_MISFIT:
+            return fit.belief(input_noise=float(inner), output_noise=float(max(outer, _LEAST_OUTPUT * inner)))
+    return None
+
+
+def signal_optimum(
+    sensors: Mapping[str, Sensor],
+    sample_rate_hz: Mapping[str, float],
+    lines: Sequence[tuple[float, float]],
+    *,
+    coloured: bool = False,
+) -> Optimum | None:
+    """Return the best settled filter of a signal for these very sensors, None if one of them has no rational model.
+
+    With white noise only it is a bound for any run; 1/f and bias noise build up within minutes, so that a short run may stay below a bound
+    that has them.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+        The instruments.
+    sample_rate_hz : mapping of str to float
+        Rate of each [Hz].
+    lines : sequence of (float, float)
+        Frequency [Hz] and amplitude [rad/s] of each line of the signal.
+    coloured : bool, optional
+        Count the sensors' noise beyond its white part too, which the filters do not know of.
+    """
+    belief: dict[str, SensorBelief] = {}
+    excess: dict[str, Callable[[FloatArray], FloatArray]] = {}
+    for name, sensor in sensors.items():
+        one = believed(sensor)
+        if one is None:
+            return None
+        belief[name] = one
+        if coloured:
+            excess[name] = _excess(sensor, one)
+    return optimum(belief, sample_rate_hz, lines, excess=excess)
+
+
+def _excess(sensor: Sensor, belief: SensorBelief) -> Callable[[FloatArray], FloatArray]:
+    """Return the density of the reading beyond the belief's white noise, Hz -> rad^2/s."""
+
+    def density(freq_hz: FloatArray) -> FloatArray:
+        power = np.abs(sensor.response(freq_hz)) ** 2
+        beyond = sensor.input_noise_psd(freq_hz) * power - belief.input_noise**2 * power - belief.output_noise**2
+        # Below 2 % it is the misfit of the white level.
+        kept: FloatArray = np.where(
+            beyond > 0.02 * (belief.input_noise**2 * power + belief.output_noise**2), beyond, 0.0
+        )
+        return kept
+
+    return density
