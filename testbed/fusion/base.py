@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.model import FusionModel, build_model
+from testbed.fusion.kernels import CONVENTIONAL, JOSEPH, SQUARE_ROOT
+from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.parts import Part
 from testbed.units import Quantity
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 DEG = math.pi / 180.0
 
 Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
+
+FORMS = {"conventional": CONVENTIONAL, "joseph": JOSEPH, "square_root": SQUARE_ROOT}
 
 _Q_SCHEMA = cast(
     "JsonDict", {"type": "string", "description": "(deg/s)^2/s^(2 order - 1)", "examples": ["0.3 (deg/s)^2/s"]}
@@ -81,6 +84,11 @@ class FilterParameters(Part):
         Its density [rad^2/s^(2m+1)], such as "0.3 (deg/s)^2/s" for order 1 or "1e6 (deg/s)^2/s^3" for order 2; None takes the filter's own.
     use_input_noise : bool
         Count the input noise of the belief as process noise.
+    form : {"joseph", "conventional", "square_root"}
+        What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite, to show it;
+        or a root D of P = D D' by QR decompositions.
+    precision : {"double", "single"}
+        Arithmetic of the state and covariance recursion.
     """
 
     default_q: ClassVar[dict[int, float]] = {}
@@ -88,6 +96,8 @@ class FilterParameters(Part):
     order: Annotated[int, Field(ge=1, le=3)] = 1
     q: Annotated[float, Field(validate_default=True, json_schema_extra=_Q_SCHEMA)] = cast("float", None)
     use_input_noise: bool = True
+    form: Literal["joseph", "conventional", "square_root"] = "joseph"
+    precision: Literal["double", "single"] = "double"
 
     @field_validator("q", mode="before")
     @classmethod
@@ -131,8 +141,22 @@ class BlockFilter:
             belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
         )
         self._sample = 0
-        self._x = np.zeros(self.model.F.shape[0])
-        self._P = self.model.P0.copy()
+        self._form = FORMS[parameters.form]
+        kind = np.float32 if parameters.precision == "single" else np.float64
+        self._x = np.zeros(self.model.F.shape[0], kind)
+        self._F, self._H = self.model.F.astype(kind), self.model.H.astype(kind)
+        self._P, self._Q = self.carried(self.model.P0), self.carried(self.model.Q)
+
+    def carried(self, covariance: FloatArray) -> FloatArray:
+        """Return what the recursion carries for a covariance, in its precision: a copy, or its root."""
+        value = covariance_root(covariance) if self._form == SQUARE_ROOT else covariance
+        return value.astype(self._x.dtype)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the state after the last step, shape (n_state, n_state) [state^2]."""
+        P = self._P.astype(float)
+        return P @ P.T if self._form == SQUARE_ROOT else P
 
     def measurement_noise(self, key: str, chosen: Mapping[str, float], *, explicit: bool) -> FloatArray:
         """Return R [rad^2/s^2] per sensor: the chosen one, or else the belief's.

@@ -71,10 +71,11 @@ class SageHusa(BlockFilter):
         self._chosen = np.zeros(self._x.size, dtype=np.bool_)
         self._chosen[0] = "Q_rate" in parameters.adapt
         self._chosen |= "Q" in parameters.adapt
-        self._Q = np.diag(np.diag(self.model.Q)) if self._chosen.any() else self.model.Q.copy()
+        if self._chosen.any():
+            self._Q = self.carried(np.diag(np.diag(self.model.Q)))
         self._progress = np.array([0.0, 1.0, 0.0])
         self._forget = parameters.beta
-        self._run = adaptive_kernel(self._x.size, R0.size)
+        self._run = adaptive_kernel(self._x.size, R0.size, self._form)
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
         """Filter the next block.
@@ -97,7 +98,7 @@ class SageHusa(BlockFilter):
         Z = self.spread(readings)
         out = np.empty((ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * len(Z), Z.shape[1]))
         state = (self._sensors, self._windows, self._chosen, self._progress, self._forget)
-        self._run(self._x, self._P, self.model.F, self._Q, self.model.H, Z, *state, out)
+        self._run(self._x, self._P, self._F, self._Q, self._H, Z, *state, out)
         diagnostics = {"Q_rate": out[kernels.Q_RATE], "guard_hits": out[kernels.GUARD_HITS]}
         for i, sensor in enumerate(self.model.sensors):
             row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
