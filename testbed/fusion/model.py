@@ -209,5 +209,6 @@ def covariance_root(P: FloatArray) -> FloatArray:
     std = np.sqrt(np.diag(P))
     scale = np.where(std > 0.0, std, 1.0)
     values, vectors = np.linalg.eigh(P / np.outer(scale, scale))
-    root: FloatArray = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
+    # Symmetric but for the scale, so that a diagonal P has a diagonal root.
+    root: FloatArray = scale[:, None] * (vectors * np.sqrt(np.clip(values, 0.0, None)) @ vectors.T)
     return root
