@@ -21,6 +21,7 @@ FILTERS = {
     "shakf": "testbed.fusion.shakf:Shakf",
     "arw_shakf": "testbed.fusion.arw_shakf:ArwShakf",
     "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
+    "allan_srkf": "testbed.fusion.allan_srkf:AllanSrkf",
 }
 
 
