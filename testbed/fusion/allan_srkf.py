@@ -8,7 +8,7 @@ from pydantic import Field
 
 from testbed.fusion.base import DEG, FilterParameters, Variance
 from testbed.fusion.shakf import AdaptiveFilter
-from testbed.units import PositiveDuration
+from testbed.units import PositiveDuration  # noqa: TC001 - pydantic reads it
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -245,9 +245,9 @@ def innovation_root(x, D, H, i, z, n):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
-    """Set K = D G' (G G' + R)^-1 with G = H D and x = x + K e, all readings at once; a sensor that is not due has e and K zero."""
-    zero = x.dtype.type(0.0)
+def project_root(D, H, R, due, G, C, n, n_sensor):  # pragma: no cover
+    """Set G = H D, zero for a sensor that is not due, and C lower triangular with C C' = G G' + R."""
+    zero = D.dtype.type(0.0)
     for i in range(n_sensor):
         for k in range(n):
             total = zero
@@ -255,7 +255,6 @@ def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
                 for j in range(n):
                     total += H[i, j] * D[j, k]
             G[i, k] = total
-    # G G' + R = C C', C lower triangular.
     for i in range(n_sensor):
         for m in range(i + 1):
             total = R[i] if m == i else zero
@@ -264,6 +263,13 @@ def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
             for k in range(m):
                 total -= C[i, k] * C[m, k]
             C[i, m] = np.sqrt(total) if m == i else total / C[m, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
+    """Set K = D G' (C C')^-1 and x = x + K e, all readings at once; a sensor that is not due has e and K zero."""
+    zero = x.dtype.type(0.0)
+    project_root(D, H, R, due, G, C, n, n_sensor)
     for j in range(n):
         for i in range(n_sensor):
             total = zero
@@ -315,7 +321,8 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # noqa: PLR0912  # pragma: no cover
+        # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
         x, moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
@@ -499,7 +506,7 @@ def adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
+def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
 
     As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of the sliding windows
@@ -508,7 +515,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         kind = x_in.dtype
         x, x_prior, P_prior, P_post = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
         moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)

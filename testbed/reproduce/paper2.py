@@ -150,7 +150,9 @@ def scale_factor(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray
     """
     return np.array(
         [
-            np.mean([np.array(amplitudes(f, a, seed, protocol, **parameters)) / a for a in protocol.scale_amplitudes], 0)
+            np.mean(
+                [np.array(amplitudes(f, a, seed, protocol, **parameters)) / a for a in protocol.scale_amplitudes], 0
+            )
             for f in protocol.scale_frequencies
         ]
     )
@@ -230,11 +232,17 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters
     run = range(1, seeds + 1)
     scale = np.median([scale_factor(seed, protocol, **parameters) for seed in run], axis=0)
     yield from _table(
-        out / "scale_factor.csv", ["frequency_hz", *CHANNELS], protocol.scale_frequencies, scale, "scale factor, indicated / true"
+        out / "scale_factor.csv",
+        ["frequency_hz", *CHANNELS],
+        protocol.scale_frequencies,
+        scale,
+        "scale factor, indicated / true",
     )
     linear = 100.0 * np.median([linearity(seed, protocol, **parameters) for seed in run], axis=0)
     columns = ["frequency_hz", *(f"{name}_percent" for name in CHANNELS)]
-    yield from _table(out / "linearity.csv", columns, protocol.linear_frequencies, linear, "linearity, % of the largest reading")
+    yield from _table(
+        out / "linearity.csv", columns, protocol.linear_frequencies, linear, "linearity, % of the largest reading"
+    )
     noise = [noise_density(seed, protocol, **parameters) for seed in run]
     freq, density = noise[0][0], np.median([value for _, value in noise], axis=0)
     columns = ["frequency_hz", *(f"{name}_rad2_s" for name in (*CHANNELS, "mhd_ars_input_referred"))]

@@ -72,7 +72,8 @@ def test_seven_states_at_one_rate_and_at_two() -> None:
     rate = np.sin(2.0 * np.pi * 5.0 * np.arange(n) / fs)
     believed = load_belief("paper2")
     full = {
-        name: LinearFilter(list(one.numerator), list(one.denominator), fs).process(rate) for name, one in believed.items()
+        name: LinearFilter(list(one.numerator), list(one.denominator), fs).process(rate)
+        for name, one in believed.items()
     }
     full = {name: value + 1e-5 * random_stream(8, name).standard_normal(n) for name, value in full.items()}
     for gyro_hz in (20000.0, 2000.0, 500.0):

@@ -50,9 +50,7 @@ def readings(reference: Any) -> dict[str, FloatArray]:
 
 @pytest.mark.oracle
 @pytest.mark.parametrize(("name", "parameters"), EVERY)
-def test_all_forms_are_the_same_filter(
-    name: str, parameters: dict[str, Any], readings: dict[str, FloatArray]
-) -> None:
+def test_all_forms_are_the_same_filter(name: str, parameters: dict[str, Any], readings: dict[str, FloatArray]) -> None:
     blocks = {
         form: estimate(name, readings, sample_rate_hz=RATES, form=form, **parameters)
         for form in ("joseph", "conventional", "square_root")
@@ -64,7 +62,9 @@ def test_all_forms_are_the_same_filter(
         np.testing.assert_allclose(block.std, wanted.std, rtol=1e-5, err_msg=form)
         for key, value in wanted.diagnostics.items():
             scale = np.nanmax(np.abs(value), initial=0.0)
-            np.testing.assert_allclose(block.diagnostics[key], value, rtol=1e-4, atol=1e-6 * scale, err_msg=f"{form} {key}")
+            np.testing.assert_allclose(
+                block.diagnostics[key], value, rtol=1e-4, atol=1e-6 * scale, err_msg=f"{form} {key}"
+            )
 
 
 @pytest.mark.parametrize("form", ["joseph", "conventional", "square_root"])
@@ -110,7 +110,7 @@ def test_triangularise_keeps_the_product_and_makes_a_triangle() -> None:
         rows = np.linalg.norm(A, axis=1)
         # Householder is backward stable row by row: m eps of each pair of rows.
         assert np.all(np.abs(L @ L.T - A @ A.T) <= 10 * m * EPS * np.outer(rows, rows))
-        wanted = np.abs(np.linalg.qr(A.T, mode="r").T)
+        wanted = np.abs(np.asarray(np.linalg.qr(A.T, mode="r")).T)
         np.testing.assert_allclose(np.abs(L[:, :n]), wanted, rtol=0, atol=100 * m * EPS * rows.max())
 
 
@@ -151,26 +151,32 @@ def test_covariance_root() -> None:
     np.testing.assert_allclose(covariance_root(np.diag([4.0, 9.0, 1e-20])), np.diag([2.0, 3.0, 1e-10]), rtol=4 * EPS)
 
 
-def _covariance(form: str, precision: str, n_time: int, **changes: float) -> tuple[FloatArray, FloatArray]:
-    """Return rate and covariance of the setting of docs/numerics.md after n_time steps."""
-    stage = Kalman(load_belief("paper2"), dict.fromkeys(RATES, 20000.0), KalmanParameters(form=form, precision=precision, **changes))
-    white = 1e-3 * random_stream(1, "forms").standard_normal((2, n_time))
-    rate = stage.process({"mems_gyro": white[0], "mhd_ars": white[1]}).rate
-    return rate, stage.covariance
+def _run_nine_states(form: str, precision: str) -> tuple[FloatArray, list[FloatArray]]:
+    """Return the rate, and the covariance after each tenth of a second, in the setting of docs/numerics.md."""
+    parameters = KalmanParameters(form=form, precision=precision, order=3)
+    stage = Kalman(load_belief("paper2"), dict.fromkeys(RATES, 20000.0), parameters)
+    rng, rates, covariances = random_stream(1, "forms"), [], []
+    for _ in range(10):
+        white = 1e-3 * rng.standard_normal((2, 2000))
+        rates.append(stage.process({"mems_gyro": white[0], "mhd_ars": white[1]}).rate)
+        covariances.append(stage.covariance)
+    return np.concatenate(rates), covariances
 
 
 def test_the_root_stays_positive_in_single_precision_where_the_others_do_not() -> None:
-    """The seven-state model, order 1, modal realisation, R and P0 as shipped, 2 s at 20 kHz."""
-    reference, P = _covariance("joseph", "double", 40_000)
-    assert np.linalg.eigvalsh(P)[0] > 0.0
+    """Order 3 (nine states), belief `paper2` in modal realisation, its R, P0 of the model, 1 s at 20 kHz."""
+    reference, truth = _run_nine_states("joseph", "double")
     lowest = {}
     for form in ("conventional", "joseph", "square_root"):
-        rate, single = _covariance(form, "single", 40_000)
-        lowest[form] = np.linalg.eigvalsh(0.5 * (single + single.T))[0]
-        print(f"{form}: lowest eigenvalue {lowest[form]:.2e}, rate off {np.abs(rate - reference).max() / DEG:.1e} deg/s")
+        rate, found = _run_nine_states(form, "single")
+        lowest[form] = min(np.linalg.eigvalsh(0.5 * (P + P.T))[0] for P in found)
+        print(
+            f"{form}: lowest eigenvalue {lowest[form]:.2e}, rate off {np.abs(rate - reference).max() / DEG:.1e} deg/s"
+        )
+    print(f"double: {min(np.linalg.eigvalsh(P)[0] for P in truth):.2e}, condition {np.linalg.cond(truth[-1]):.1e}")
     assert lowest["conventional"] < 0.0
-    # D D' formed in double: rounding of the product alone.
-    assert lowest["square_root"] > -10 * EPS * np.trace(P)
+    assert lowest["joseph"] < 0.0
+    assert lowest["square_root"] > 0.0
 
 
 def test_square_root_divides_into_blocks_bit_for_bit(readings: dict[str, FloatArray]) -> None:
@@ -178,7 +184,9 @@ def test_square_root_divides_into_blocks_bit_for_bit(readings: dict[str, FloatAr
     whole = Kalman(default_belief(), RATES, parameters).process(readings)
     stage = Kalman(default_belief(), RATES, parameters)
     parts = [
-        stage.process({"mems_gyro": readings["mems_gyro"][-(-a // 10) : -(-b // 10)], "mhd_ars": readings["mhd_ars"][a:b]})
+        stage.process(
+            {"mems_gyro": readings["mems_gyro"][-(-a // 10) : -(-b // 10)], "mhd_ars": readings["mhd_ars"][a:b]}
+        )
         for a, b in ((0, 13), (13, 2000), (2000, 6000))
     ]
     assert np.array_equal(np.concatenate([part.rate for part in parts]), whole.rate)

@@ -26,7 +26,7 @@ def test_a_rational_response_is_found_again(numerator: list[float], poles_hz: li
     a = np.poly(-2.0 * np.pi * np.array(poles_hz)).real
     wanted = transfer(numerator, list(a), FREQ_HZ)
     found = fit_transfer(FREQ_HZ, wanted, len(poles_hz), blind_to_constant=blind)
-    # The search stops at 1e-15 of its sum of squares, so the largest error is some 1e-7 of the response.
+    # Coefficients over four decades of frequency leave some 1e-9; a neighbouring fit would be off by 1e-3.
     np.testing.assert_allclose(transfer(list(found[0]), list(found[1]), FREQ_HZ) / wanted, 1.0, rtol=0, atol=1e-6)
     np.testing.assert_allclose(np.sort_complex(np.roots(found[1])), np.sort_complex(np.roots(a)), rtol=1e-3)
     assert (found[0][-1] == 0.0) == blind
@@ -40,5 +40,7 @@ def test_the_shipped_belief_of_paper2_is_the_fit_to_its_sensor() -> None:
     error = np.abs(transfer(list(believed.numerator), list(believed.denominator), FREQ_HZ) / wanted - 1.0).max()
     print(f"belief paper2: largest error {100 * error:.3f} %")
     assert error < 0.0015
-    again = fit_transfer(np.geomspace(0.1, 1000.0, 400), mhd_response(np.geomspace(0.1, 1000.0, 400)), 4, blind_to_constant=True)
+    again = fit_transfer(
+        np.geomspace(0.1, 1000.0, 400), mhd_response(np.geomspace(0.1, 1000.0, 400)), 4, blind_to_constant=True
+    )
     np.testing.assert_allclose(again[1], believed.denominator, rtol=1e-4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,6 +14,9 @@ from testbed.cli import app
 from testbed.errors import ScenarioError
 from testbed.reproduce import run_paper
 from testbed.reproduce.paper2 import CHANNELS, Protocol, amplitudes, mhd_response, noise_density, report
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 FEW = Protocol(
     scale_amplitudes=(20.0, 50.0),
@@ -30,7 +33,8 @@ def test_the_protocol_is_the_papers() -> None:
     full = Protocol()
     assert full.scale_amplitudes == (20, 30, 40, 50)
     assert len(full.scale_frequencies) == 9 + 20 + 8
-    assert (full.scale_frequencies[0], full.scale_frequencies[-1]) == (0.1, 60)
+    assert min(full.scale_frequencies) == 0.1
+    assert max(full.scale_frequencies) == 60
     assert full.linear_amplitudes == (1, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50)
     assert full.linear_frequencies == (0.2, 2, 20, 50)
 
