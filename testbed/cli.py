@@ -132,6 +132,19 @@ def allan(
     print_allan(analyses, write_figure(allan_figure(analyses), out or Path(f"allan_{name}.svg")))
 
 
+@app.command()
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper2.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds to take the median over.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder for the tables; default runs/<paper>.")] = None,
+) -> None:
+    """Repeat the measurements of a paper and print its numbers beside ours."""
+    from testbed.reproduce import run_paper
+
+    for line in run_paper(paper, seeds, out or Path("runs") / paper):
+        typer.echo(line)
+
+
 def main() -> None:
     """Run the command line; errors become one clear message and the exit status of the contract."""
     signal.signal(signal.SIGTERM, _interrupt)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from testbed.fusion.arw_shakf import ArwShakf
+from testbed.fusion.belief import load_belief
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -48,3 +49,11 @@ def test_identified_belief_is_what_the_example_writes():
         assert fit.worst < 2e-4
         for key, (value, _) in program.NOISE[name].items():
             assert f"  {key}: {value}" in program.belief_file()
+
+
+def test_the_shipped_belief_of_paper2_is_the_fit_to_its_sensor():
+    found, believed = example("identify_paper2").fit(), load_belief("paper2")["mhd_ars"]
+    assert found.worst < 0.0015
+    # The poles follow the response to the rounding of the search.
+    assert np.allclose(found.denominator, believed.denominator, rtol=1e-4, atol=0.0)
+    assert np.allclose(found.numerator, believed.numerator, rtol=1e-4, atol=0.0)

@@ -16,7 +16,7 @@ from testbed.errors import ScenarioError
 from testbed.loader import load_scenario
 from testbed.store import write_scenario
 
-SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").glob("*.yaml"))
+SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios").rglob("*.yaml"))
 
 GOOD = """\
 name: good

@@ -23,6 +23,7 @@ FILTERS = {
     "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
     "steady_state": "testbed.fusion.steady_state:SteadyState",
     "wideband": "testbed.fusion.wideband:Wideband",
+    "allan_srkf": "testbed.fusion.allan_srkf:AllanSrkf",
 }
 
 

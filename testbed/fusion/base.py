@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.model import FusionModel, build_model
+from testbed.fusion.kernels import CONVENTIONAL, JOSEPH, SQUARE_ROOT
+from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.parts import Part
 from testbed.units import Quantity
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 DEG = math.pi / 180.0
 
 Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
+
+FORMS = {"conventional": CONVENTIONAL, "joseph": JOSEPH, "square_root": SQUARE_ROOT}
 
 _Q_SCHEMA = cast(
     "JsonDict", {"type": "string", "description": "(deg/s)^2/s^(2 order - 1)", "examples": ["0.3 (deg/s)^2/s"]}
@@ -106,6 +109,22 @@ class FilterParameters(Part):
         return f"{value!r} {signal_noise_unit(self.order)}" if (info.context or {}).get("border") else value
 
 
+class CovarianceParameters(FilterParameters):
+    """Parameters of a filter whose covariance recursion can be chosen.
+
+    Parameters
+    ----------
+    form : {"joseph", "conventional", "square_root"}
+        What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite, to show it;
+        or a root D of P = D D' by QR decompositions.
+    precision : {"double", "single"}
+        Arithmetic of the state and covariance recursion.
+    """
+
+    form: Literal["joseph", "conventional", "square_root"] = "joseph"
+    precision: Literal["double", "single"] = "double"
+
+
 class BlockFilter:
     """Common part of the filters: builds the model, checks the blocks and spreads their readings over the fastest rate.
 
@@ -127,12 +146,29 @@ class BlockFilter:
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: FilterParameters
     ) -> None:
+        form, precision = "joseph", "double"
+        if isinstance(parameters, CovarianceParameters):
+            form, precision = parameters.form, parameters.precision
         self.model: FusionModel = build_model(
             belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
         )
         self._sample = 0
-        self._x = np.zeros(self.model.F.shape[0])
-        self._P = self.model.P0.copy()
+        self._form = FORMS[form]
+        kind = np.float32 if precision == "single" else np.float64
+        self._x = np.zeros(self.model.F.shape[0], kind)
+        self._F, self._H = self.model.F.astype(kind), self.model.H.astype(kind)
+        self._P, self._Q = self.carried(self.model.P0), self.carried(self.model.Q)
+
+    def carried(self, covariance: FloatArray) -> FloatArray:
+        """Return what the recursion carries for a covariance, in its precision: a copy, or its root."""
+        value = covariance_root(covariance) if self._form == SQUARE_ROOT else covariance
+        return value.astype(self._x.dtype)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the state after the last step, shape (n_state, n_state) [state^2]."""
+        P = self._P.astype(float)
+        return P @ P.T if self._form == SQUARE_ROOT else P
 
     def measurement_noise(self, key: str, chosen: Mapping[str, float], *, explicit: bool) -> FloatArray:
         """Return R [rad^2/s^2] per sensor: the chosen one, or else the belief's.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FilterParameters, Variance
+from testbed.fusion.base import DEG, BlockFilter, CovarianceParameters, EstimateBlock, Variance
 from testbed.fusion.kernels import (
     HEADER_ROWS,
     INNOVATION,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from testbed.parts import Part
 
 
-class KalmanParameters(FilterParameters):
+class KalmanParameters(CovarianceParameters):
     """Parameters of `Kalman`.
 
     Parameters
@@ -69,9 +69,9 @@ class Kalman(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: KalmanParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        self._R = self.measurement_noise("R", parameters.R, explicit=True)
+        self._R = self.measurement_noise("R", parameters.R, explicit=True).astype(self._x.dtype)
         self._started = False
-        self._run = kalman_kernel(self._x.size, self._R.size)
+        self._run = kalman_kernel(self._x.size, self._R.size, self._form)
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
         """Filter the next block.
@@ -93,10 +93,9 @@ class Kalman(BlockFilter):
         """
         Z = self.spread(readings)
         out = np.empty((HEADER_ROWS + INNOVATION_ROWS * len(Z), Z.shape[1]))
-        model = self.model
-        self._started = self._run(self._x, self._P, model.F, model.Q, model.H, self._R, Z, self._started, out)
+        self._started = self._run(self._x, self._P, self._F, self._Q, self._H, self._R, Z, self._started, out)
         diagnostics = {}
-        for i, name in enumerate(model.sensors):
+        for i, name in enumerate(self.model.sensors):
             row = HEADER_ROWS + INNOVATION_ROWS * i
             diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
             diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]

@@ -1,8 +1,12 @@
 """The compiled steps of the filters, for sizes known to the compiler.
 
 `kalman_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of sensors): loops of constant length unroll.
-They close over these two integers only, which numba's disk cache keys by value, so that a second process loads and does not compile.
+They close over integers only, which numba's disk cache keys by value, so that a second process loads and does not compile.
 All kernels live in this file because that cache watches no other file than the kernel's own.
+
+The arrays handed in decide the precision: in single precision no sum of the state and covariance recursion is formed in double.
+`form` decides what stands for the covariance: P itself (CONVENTIONAL, JOSEPH), or, in SQUARE_ROOT, roots D and S in place of P and Q,
+P = D D' and Q = S S'.
 
 Readings come as one row per sensor at the fastest rate: NaN where none is due, infinite where one is due but missing (it also breaks the
 chain of differences). Both mean: predict only. Until the first reading nothing is predicted either.
@@ -17,6 +21,9 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+
+# Forms of the covariance.
+CONVENTIONAL, JOSEPH, SQUARE_ROOT = 0, 1, 2
 
 # Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
 RATE, STD, HEADER_ROWS = 0, 1, 2
@@ -37,6 +44,7 @@ SENSOR = np.dtype(
     [
         ("adapt_R", np.bool_),  # (17)
         ("adapt_offset", np.bool_),  # (16)
+        ("follow", np.bool_),  # R is N_k / dT
         ("difference", np.bool_),  # judge by differences of the innovation
         ("forget", np.float64),  # beta
         ("power", np.float64),  # beta^k
@@ -69,7 +77,7 @@ SENSOR = np.dtype(
 def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
     """Set x = F x and P = F P F' + Q, exactly symmetric."""
     for i in range(n):
-        total = 0.0
+        total = x.dtype.type(0.0)
         for j in range(n):
             total += F[i, j] * x[j]
         moved[i] = total
@@ -94,9 +102,9 @@ def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
 @njit(cache=True, forceinline=True, error_model="numpy")
 def innovation(x, P, H, i, z, n):  # pragma: no cover
     """Return (z - H_i x, H_i P H_i')."""
-    e, spread = z, 0.0
+    e, spread = z, x.dtype.type(0.0)
     for j in range(n):
-        total = 0.0
+        total = x.dtype.type(0.0)
         for k in range(n):
             total += P[j, k] * H[i, k]
         e -= H[i, j] * x[j]
@@ -109,7 +117,7 @@ def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
     """Apply one scalar reading in Joseph form, P = (I - K h)P(I - K h)' + K R K', its factors applied one after the other."""
     e, C = z, R
     for j in range(n):
-        total = 0.0
+        total = x.dtype.type(0.0)
         for k in range(n):
             total += P[j, k] * H[i, k]
         g[j] = total
@@ -134,38 +142,244 @@ def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
             P[k, j] = total
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_plain(x, P, F, Q, work, moved, n):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q, every element computed for itself."""
+    for i in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += F[i, j] * x[j]
+        moved[i] = total
+    for i in range(n):
+        x[i] = moved[i]
+    for i in range(n):
+        for j in range(n):
+            total = x.dtype.type(0.0)
+            for k in range(n):
+                total += F[i, k] * P[k, j]
+            work[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            total = Q[i, j]
+            for k in range(n):
+                total += work[i, k] * F[j, k]
+            P[i, j] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_plain(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+    """Apply one scalar reading in the short form P = P - K h P, whose rounding can cost P its symmetry and its positive eigenvalues."""
+    e, C = innovation(x, P, H, i, z, n)
+    C += R
+    for j in range(n):
+        total = x.dtype.type(0.0)
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        K[j] = total / C
+    for k in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += H[i, j] * P[j, k]
+        g[k] = total
+    for j in range(n):
+        x[j] += K[j] * e
+        for k in range(n):
+            P[j, k] -= K[j] * g[k]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def triangularise(A, n, m):  # pragma: no cover
+    """Bring A (n, m) to lower triangular form by Householder reflections from the right (the QR of A'), which leaves A A' as it is."""
+    zero = A.dtype.type(0.0)
+    for i in range(n):
+        square = zero
+        for k in range(i + 1, m):
+            square += A[i, k] * A[i, k]
+        if square == zero:
+            continue
+        length = np.sqrt(square + A[i, i] * A[i, i])
+        # The sign without cancellation.
+        head = A[i, i] + length if A[i, i] > zero else A[i, i] - length
+        scale = (head * head + square) / A.dtype.type(2.0)
+        diagonal = A[i, i] - head
+        A[i, i] = head
+        for j in range(i + 1, n):
+            total = zero
+            for k in range(i, m):
+                total += A[j, k] * A[i, k]
+            total /= scale
+            for k in range(i, m):
+                A[j, k] -= total * A[i, k]
+        A[i, i] = diagonal
+        for k in range(i + 1, m):
+            A[i, k] = zero
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
+    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'."""
+    for i in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += F[i, j] * x[j]
+        moved[i] = total
+    for i in range(n):
+        x[i] = moved[i]
+        for j in range(n):
+            array[i, j] = F[i, 0] * D[0, j]
+            array[i, n + j] = S[i, j]
+        for k in range(1, n):
+            for j in range(n):
+                array[i, j] += F[i, k] * D[k, j]
+    triangularise(array, n, 2 * n)
+    for i in range(n):
+        for j in range(n):
+            D[i, j] = array[i, j]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovation_root(x, D, H, i, z, n):  # pragma: no cover
+    """Return (z - H_i x, |D' H_i'|^2)."""
+    e, spread = z, x.dtype.type(0.0)
+    for j in range(n):
+        e -= H[i, j] * x[j]
+    for k in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += H[i, j] * D[j, k]
+        spread += total * total
+    return e, spread
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def project_root(D, H, R, due, G, C, n, n_sensor):  # pragma: no cover
+    """Set G = H D, zero for a sensor that is not due, and C lower triangular with C C' = G G' + R."""
+    zero = D.dtype.type(0.0)
+    for i in range(n_sensor):
+        for k in range(n):
+            total = zero
+            if due[i]:
+                for j in range(n):
+                    total += H[i, j] * D[j, k]
+            G[i, k] = total
+    for i in range(n_sensor):
+        for m in range(i + 1):
+            total = R[i] if m == i else zero
+            for k in range(n):
+                total += G[i, k] * G[m, k]
+            for k in range(m):
+                total -= C[i, k] * C[m, k]
+            C[i, m] = np.sqrt(total) if m == i else total / C[m, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
+    """Set K = D G' (C C')^-1 and x = x + K e, all readings at once; a sensor that is not due has e and K zero."""
+    zero = x.dtype.type(0.0)
+    project_root(D, H, R, due, G, C, n, n_sensor)
+    for j in range(n):
+        for i in range(n_sensor):
+            total = zero
+            for k in range(n):
+                total += D[j, k] * G[i, k]
+            for k in range(i):
+                total -= K[j, k] * C[i, k]
+            K[j, i] = total / C[i, i]
+        for i in range(n_sensor - 1, -1, -1):
+            total = K[j, i]
+            for k in range(i + 1, n_sensor):
+                total -= K[j, k] * C[k, i]
+            K[j, i] = total / C[i, i]
+        for i in range(n_sensor):
+            x[j] += K[j, i] * e[i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_root(D, G, K, R, array, n, n_sensor):  # pragma: no cover
+    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K' by the QR of [(I - K H)D, K R^(1/2)]'."""
+    for i in range(n):
+        for j in range(n):
+            array[i, j] = D[i, j]
+        for k in range(n_sensor):
+            for j in range(n):
+                array[i, j] -= K[i, k] * G[k, j]
+            array[i, n + k] = K[i, k] * np.sqrt(R[k])
+    triangularise(array, n, n + n_sensor)
+    for i in range(n):
+        for j in range(n):
+            D[i, j] = array[i, j]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def row_square(D, j, n):  # pragma: no cover
+    """Return (D D')_jj."""
+    total = D.dtype.type(0.0)
+    for k in range(n):
+        total += D[j, k] * D[j, k]
+    return total
+
+
 @functools.lru_cache
-def kalman_kernel(n: int, n_sensor: int) -> Any:
+def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
     """Return run(x, P, F, Q, H, R, Z, started, out) -> started, the plain Kalman filter over a block.
 
-    x (n,) and P (n, n) are replaced by the posterior of the last step. Z is (n_sensor, n_time);
+    x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is (n_sensor, n_time);
     `out` (HEADER_ROWS + INNOVATION_ROWS * n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # noqa: PLR0912  # pragma: no cover
+        # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
-        x, moved, g, K = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H = np.empty((n_sensor, n))
+        kind = x_in.dtype
+        x, moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        P, F, Q, work = np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind)
+        H = np.empty((n_sensor, n), kind)
+        G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
+        array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         for k in range(Z.shape[1]):
             if started:
-                predict(x, P, F, Q, work, moved, n)
+                if form == SQUARE_ROOT:
+                    predict_root(x, P, F, Q, array, moved, n)
+                elif form == JOSEPH:
+                    predict(x, P, F, Q, work, moved, n)
+                else:
+                    predict_plain(x, P, F, Q, work, moved, n)
+            read = False
             for i in range(n_sensor):
                 row = HEADER_ROWS + INNOVATION_ROWS * i
                 out[row + INNOVATION, k] = np.nan
                 out[row + INNOVATION_VARIANCE, k] = np.nan
-                if np.isfinite(Z[i, k]):
-                    e, spread = innovation(x, P, H, i, Z[i, k], n)
-                    out[row + INNOVATION, k] = e
+                due[i] = np.isfinite(Z[i, k])
+                e[i] = kind.type(0.0)
+                if due[i]:
+                    read = True
+                    if form == SQUARE_ROOT:
+                        e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
+                    else:
+                        e[i], spread = innovation(x, P, H, i, kind.type(Z[i, k]), n)
+                    out[row + INNOVATION, k] = e[i]
                     out[row + INNOVATION_VARIANCE, k] = spread + R[i]
-            for i in range(n_sensor):
-                if np.isfinite(Z[i, k]):
-                    started = True
-                    update(x, P, H, i, Z[i, k], R[i], g, K, n)
-            out[RATE, k] = x[0]
-            out[STD, k] = np.sqrt(P[0, 0])
+            if read:
+                started = True
+            if form == SQUARE_ROOT:
+                if read:
+                    gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                # Sent out first: in hardware the covariance has until the next reading.
+                out[RATE, k] = x[0]
+                if read:
+                    update_root(P, G, gain, R, array, n, n_sensor)
+                out[STD, k] = np.sqrt(row_square(P, 0, n))
+            else:
+                for i in range(n_sensor):
+                    if due[i]:
+                        if form == JOSEPH:
+                            update(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                        else:
+                            update_plain(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                out[RATE, k] = x[0]
+                out[STD, k] = np.sqrt(P[0, 0])
         x_in[:], P_in[:] = x, P
         return started
 
@@ -465,11 +679,8 @@ def inflation(sensor, window, square, C):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def adapt_R(sensor, square, spread):  # pragma: no cover
-    """Apply (17), R <- (1 - d)R + d(square - spread) with d = (1 - beta)/(1 - beta^(k+1)), within the bounds of R."""
-    sensor.power *= sensor.forget
-    d = (1.0 - sensor.forget) / (1.0 - sensor.power)
-    R = (1.0 - d) * sensor.R + d * (square - spread)
+def set_R(sensor, R):  # pragma: no cover
+    """Set R within its bounds."""
     if sensor.lowest > R:
         R = sensor.lowest
         sensor.hits += 1
@@ -477,6 +688,14 @@ def adapt_R(sensor, square, spread):  # pragma: no cover
         R = sensor.highest
         sensor.hits += 1
     sensor.R = R
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_R(sensor, square, spread):  # pragma: no cover
+    """Apply (17), R <- (1 - d)R + d(square - spread) with d = (1 - beta)/(1 - beta^(k+1)), within the bounds of R."""
+    sensor.power *= sensor.forget
+    d = (1.0 - sensor.forget) / (1.0 - sensor.power)
+    set_R(sensor, (1.0 - d) * sensor.R + d * (square - spread))
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -488,14 +707,15 @@ def adapt_offset(sensor, e):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def observe(sensor, window, x, P, H, i, z, row, n):  # pragma: no cover
-    """Prepare the use of a reading: N_k, band, innovation and S; fill its `row` of diagnostics.
+def observe(sensor, window, e, spread, z, row):  # pragma: no cover
+    """Prepare the use of the reading z with the innovation e (11) and spread H P H': N_k, band, R and S; fill its `row` of diagnostics.
 
-    Return the innovation (11), H P H', the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
+    Return the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
     """
     watch_increments(sensor, z)
     judge_band(sensor)
-    e, spread = innovation(x, P, H, i, z - sensor.offset, n)
+    if sensor.follow and sensor.increments > 0:
+        set_R(sensor, sensor.increment_variance)
     square = e * e
     if sensor.difference:
         square = 0.5 * (e - sensor.previous_innovation) ** 2
@@ -509,7 +729,7 @@ def observe(sensor, window, x, P, H, i, z, row, n):  # pragma: no cover
     row[INCREMENTS] = sensor.increment_variance if sensor.increments > 0 else np.nan
     row[BAND] = sensor.band if sensor.band >= 0 else np.nan
     row[INFLATION] = factor
-    return e, spread, square, factor * sensor.R
+    return square, factor * sensor.R
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -523,16 +743,16 @@ def learn(sensor, e, square, spread):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def adapt_Q(Q, chosen, x, x_prior, P, P_prior, d, n):  # pragma: no cover
+def adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n):  # pragma: no cover
     """Apply (15) with +P to the chosen diagonal elements of Q; return how many the guard at zero held.
 
-    K e is x - x_prior, and A P_prev A' is P_prior - Q.
+    K e is x - x_prior, and A P_prev A' is P_prior - Q; of P only the diagonal counts.
     """
     hits = 0
     for j in range(n):
         if chosen[j]:
             moved = x[j] - x_prior[j]
-            value = Q[j, j] + d * (moved * moved + P[j, j] - P_prior[j])
+            value = Q[j, j] + d * (moved * moved + P_post[j] - P_prior[j])
             if value < 0.0:
                 value = 0.0
                 hits += 1
@@ -541,43 +761,69 @@ def adapt_Q(Q, chosen, x, x_prior, P, P_prior, d, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def adaptive_kernel(n: int, n_sensor: int) -> Any:
+def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
 
     As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of the sliding windows
     in `windows` (n_sensor, n_window), the diagonal elements of Q that adapt in `chosen` (n,), and `progress` = [started, beta^k, guard hits of Q].
+    What the adaptation remembers is in double precision whatever the arrays are.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # pragma: no cover
-        x, x_prior, P_prior = np.empty(n), np.empty(n), np.empty(n)
-        moved, g, K = np.empty(n), np.empty(n), np.empty(n)
-        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H = np.empty((n_sensor, n))
-        e, square, spread, R = np.empty(n_sensor), np.empty(n_sensor), np.empty(n_sensor), np.empty(n_sensor)
+    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        kind = x_in.dtype
+        x, x_prior, P_prior, P_post = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        P, F, Q, work = np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind)
+        H, due = np.empty((n_sensor, n), kind), np.empty(n_sensor, np.bool_)
+        e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
+        square = np.empty(n_sensor)
+        G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
+        array = np.empty((n, 2 * n), kind)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         adapts_Q = chosen.any()
         for k in range(Z.shape[1]):
             predicted = progress[0] > 0.0
             if predicted:
-                predict(x, P, F, Q, work, moved, n)
+                if form == SQUARE_ROOT:
+                    predict_root(x, P, F, Q, array, moved, n)
+                elif form == JOSEPH:
+                    predict(x, P, F, Q, work, moved, n)
+                else:
+                    predict_plain(x, P, F, Q, work, moved, n)
+            read = False
             for i in range(n_sensor):
                 row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
                 for m in range(ADAPTIVE_ROWS):
                     out[row + m, k] = np.nan
-                if not np.isfinite(Z[i, k]):
+                due[i] = np.isfinite(Z[i, k])
+                e[i], R[i] = kind.type(0.0), kind.type(1.0)
+                if not due[i]:
                     continue
-                e[i], spread[i], square[i], R[i] = observe(sensors[i], windows[i], x, P, H, i, Z[i, k], out[row:, k], n)
+                read = True
+                z = kind.type(Z[i, k] - sensors[i].offset)
+                if form == SQUARE_ROOT:
+                    e[i], spread[i] = innovation_root(x, P, H, i, z, n)
+                else:
+                    e[i], spread[i] = innovation(x, P, H, i, z, n)
+                square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
             if adapts_Q:
                 for j in range(n):
                     x_prior[j] = x[j]
-                    P_prior[j] = P[j, j]
-            read = False
+                    P_prior[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+            if form == SQUARE_ROOT and read:
+                gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                # Sent out first: in hardware the covariance has until the next reading.
+                out[RATE, k] = x[0]
+                update_root(P, G, gain, R, array, n, n_sensor)
             hits = 0
             for i in range(n_sensor):
-                if np.isfinite(Z[i, k]):
-                    read = True
-                    update(x, P, H, i, Z[i, k] - sensors[i].offset, R[i], g, K, n)
+                if due[i]:
+                    z = kind.type(Z[i, k] - sensors[i].offset)
+                    if form == JOSEPH:
+                        update(x, P, H, i, z, R[i], g, K, n)
+                    elif form == CONVENTIONAL:
+                        update_plain(x, P, H, i, z, R[i], g, K, n)
                     learn(sensors[i], e[i], square[i], spread[i])
                 elif np.isinf(Z[i, k]):
                     sensors[i].previous_innovation = np.nan
@@ -586,12 +832,20 @@ def adaptive_kernel(n: int, n_sensor: int) -> Any:
             if read and predicted and adapts_Q:
                 progress[1] *= forget
                 d = (1.0 - forget) / (1.0 - progress[1])
-                progress[2] += adapt_Q(Q, chosen, x, x_prior, P, P_prior, d, n)
+                for j in range(n):
+                    P_post[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+                    # Q is diagonal here, and so is its root.
+                    if form == SQUARE_ROOT:
+                        Q[j, j] = Q[j, j] * Q[j, j]
+                progress[2] += adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n)
+                if form == SQUARE_ROOT:
+                    for j in range(n):
+                        Q[j, j] = np.sqrt(Q[j, j])
             if read:
                 progress[0] = 1.0
             out[RATE, k] = x[0]
-            out[STD, k] = np.sqrt(P[0, 0])
-            out[Q_RATE, k] = Q[0, 0]
+            out[STD, k] = np.sqrt(row_square(P, 0, n) if form == SQUARE_ROOT else P[0, 0])
+            out[Q_RATE, k] = row_square(Q, 0, n) if form == SQUARE_ROOT else Q[0, 0]
             out[GUARD_HITS, k] = hits + progress[2]
         x_in[:], P_in[:], Q_in[:] = x, P, Q
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from testbed.fusion import kernels
-from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FilterParameters, Variance
+from testbed.fusion.base import DEG, BlockFilter, CovarianceParameters, EstimateBlock, Variance
 from testbed.fusion.kernels import ADAPTIVE_HEADER_ROWS, ADAPTIVE_ROWS, SENSOR, adaptive_kernel
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from testbed.parts import Part
 
 
-class SageHusaParameters(FilterParameters):
+class SageHusaParameters(CovarianceParameters):
     """Parameters of the Sage-Husa recursions.
 
     Parameters
@@ -51,10 +51,9 @@ class ShakfParameters(SageHusaParameters):
     use_input_noise: bool = False
 
 
-class SageHusa(BlockFilter):
-    """The Kalman filter of `Kalman` whose R, Q or r follow the innovations; base of `Shakf` and `ArwShakf`."""
+class AdaptiveFilter(BlockFilter):
+    """The Kalman filter of `Kalman` on the adaptive kernel, as yet without any adaptation; base of the adaptive filters."""
 
-    Parameters: ClassVar[type[Part]] = SageHusaParameters
     _diagnostics: ClassVar[dict[str, int]] = {
         "innovation": kernels.INNOVATION,
         "innovation_variance": kernels.INNOVATION_VARIANCE,
@@ -62,19 +61,16 @@ class SageHusa(BlockFilter):
     }
 
     def __init__(
-        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SageHusaParameters
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: CovarianceParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        R0 = self.measurement_noise("R0", parameters.R0, explicit="R0" in parameters.model_fields_set)
-        self._sensors = _sensor_records(parameters, R0)
-        self._windows = np.zeros((R0.size, 1))
+        n_sensor = len(self.model.sensors)
+        self._sensors = _sensor_records(n_sensor)
+        self._windows = np.zeros((n_sensor, 1))
         self._chosen = np.zeros(self._x.size, dtype=np.bool_)
-        self._chosen[0] = "Q_rate" in parameters.adapt
-        self._chosen |= "Q" in parameters.adapt
-        self._Q = np.diag(np.diag(self.model.Q)) if self._chosen.any() else self.model.Q.copy()
         self._progress = np.array([0.0, 1.0, 0.0])
-        self._forget = parameters.beta
-        self._run = adaptive_kernel(self._x.size, R0.size)
+        self._forget = 0.0
+        self._run = adaptive_kernel(self._x.size, n_sensor, self._form)
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
         """Filter the next block.
@@ -97,7 +93,7 @@ class SageHusa(BlockFilter):
         Z = self.spread(readings)
         out = np.empty((ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * len(Z), Z.shape[1]))
         state = (self._sensors, self._windows, self._chosen, self._progress, self._forget)
-        self._run(self._x, self._P, self.model.F, self._Q, self.model.H, Z, *state, out)
+        self._run(self._x, self._P, self._F, self._Q, self._H, Z, *state, out)
         diagnostics = {"Q_rate": out[kernels.Q_RATE], "guard_hits": out[kernels.GUARD_HITS]}
         for i, sensor in enumerate(self.model.sensors):
             row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
@@ -105,19 +101,34 @@ class SageHusa(BlockFilter):
         return EstimateBlock(out[kernels.RATE], out[kernels.STD], diagnostics)
 
 
-def _sensor_records(parameters: SageHusaParameters, R0: np.ndarray) -> np.ndarray:
-    """Return one SENSOR record per sensor, without bands."""
-    records = np.zeros(R0.size, dtype=SENSOR)
-    records["adapt_R"] = "R" in parameters.adapt
-    records["adapt_offset"] = "r" in parameters.adapt
-    records["forget"] = parameters.beta
+def _sensor_records(n_sensor: int) -> np.ndarray:
+    """Return one SENSOR record per sensor that adapts nothing."""
+    records = np.zeros(n_sensor, dtype=SENSOR)
     records["power"] = records["offset_power"] = 1.0
-    records["R"] = R0
-    records["lowest"] = records["floor"] = parameters.R_floor
     records["highest"] = records["clamp"] = np.inf
     records["previous_innovation"] = records["previous_reading"] = np.nan
     records["band"] = -1
     return records
+
+
+class SageHusa(AdaptiveFilter):
+    """The Kalman filter of `Kalman` whose R, Q or r follow the innovations; base of `Shakf` and `ArwShakf`."""
+
+    Parameters: ClassVar[type[Part]] = SageHusaParameters
+
+    def __init__(
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SageHusaParameters
+    ) -> None:
+        super().__init__(belief, sample_rate_hz, parameters)
+        self._sensors["R"] = self.measurement_noise("R0", parameters.R0, explicit="R0" in parameters.model_fields_set)
+        self._sensors["lowest"] = self._sensors["floor"] = parameters.R_floor
+        self._sensors["adapt_R"] = "R" in parameters.adapt
+        self._sensors["adapt_offset"] = "r" in parameters.adapt
+        self._sensors["forget"] = self._forget = parameters.beta
+        self._chosen[0] = "Q_rate" in parameters.adapt
+        self._chosen |= "Q" in parameters.adapt
+        if self._chosen.any():
+            self._Q = self.carried(np.diag(np.diag(self.model.Q)))
 
 
 class Shakf(SageHusa):

@@ -92,11 +92,11 @@ def test_nothing_is_predicted_before_the_first_reading() -> None:
 _SECOND_START = """
 import numpy as np
 from testbed.fusion import estimate
-from testbed.fusion.kernels import adaptive_kernel, kalman_kernel
+from testbed.fusion.kernels import JOSEPH, adaptive_kernel, kalman_kernel
 z = {"mems_gyro": np.zeros(2), "mhd_ars": np.zeros(20)}
 for name in ("kalman", "arw_shakf"):
     estimate(name, z, sample_rate_hz={"mems_gyro": 2000.0, "mhd_ars": 20000.0})
-print(sum(sum(k(5, 2).stats.cache_misses.values()) for k in (kalman_kernel, adaptive_kernel)))
+print(sum(sum(k(5, 2, JOSEPH).stats.cache_misses.values()) for k in (kalman_kernel, adaptive_kernel)))
 """
 
 

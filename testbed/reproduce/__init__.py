@@ -1,0 +1,49 @@
+"""Measurements of the papers repeated on the simulated sensors, the papers' numbers beside ours."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+from testbed.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PAPERS = {"paper2": "testbed.reproduce.paper2"}
+PLANNED = ("paper1", "paper3")
+
+
+def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:
+    """Repeat the measurements of a paper, write its tables and yield the lines to print.
+
+    Parameters
+    ----------
+    name : str
+        One of `PAPERS`.
+    seeds : int
+        Seeds 1 to this, of which each result is the median [-].
+    out : Path
+        Folder of the tables; made if it does not exist.
+
+    Yields
+    ------
+    str
+        One line of the report.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such paper, or not yet, or the folder cannot be written.
+    """
+    if name not in PAPERS:
+        known = f"there is: {', '.join(PAPERS)}"
+        problem = f"{name}: not yet, {known}" if name in PLANNED else f"{name}: unknown paper, {known}"
+        raise ScenarioError(problem)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        problem = f"--out: expected a folder that can be written, got {out}: {error.strerror}"
+        raise ScenarioError(problem) from error
+    yield from importlib.import_module(PAPERS[name]).report(seeds, out)

@@ -1,0 +1,285 @@
+"""Paper 2's protocol on the simulated sensors: scale factor, linearity and noise at standstill.
+
+Jiang, Li, Liu, Tuo, Chinese Journal of Sensors and Actuators 2022 no. 9. One clock reads both sensors, which feel the same rate: the chain
+is driven by exact sines, since the table has no torque for 50 deg/s at 60 Hz.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from testbed.fusion import estimate
+from testbed.sensors import load_preset
+from testbed.spectra import WelchDensity, log_average
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from testbed.sensors.mhd_ars import MhdArs
+    from testbed.signals import ComplexArray, FloatArray
+
+CLOCK_HZ = 20_000.0
+DEG = np.pi / 180.0
+CHANNELS = ("mems_gyro", "mhd_ars", "fused")
+# Volts per (deg/s) of the paper's fused output.
+PAPER_SCALE = 0.04
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """The paper's protocol: amplitudes [deg/s], frequencies [Hz] and times [s].
+
+    Parameters
+    ----------
+    scale_amplitudes, scale_frequencies : tuple of float
+        Grid of the scale factor, whose mean over the amplitudes counts [deg/s], [Hz].
+    linear_amplitudes, linear_frequencies : tuple of float
+        Grid of the linearity [deg/s], [Hz].
+    settle, observe : float
+        Time before each measurement, and least time of it; it lasts a whole number of periods [s].
+    warm_up, standstill : float
+        Time before the record of the noise, until the gain of the gyro has settled, and its length [s].
+    """
+
+    scale_amplitudes: tuple[float, ...] = (20.0, 30.0, 40.0, 50.0)
+    scale_frequencies: tuple[float, ...] = (
+        *(round(0.1 * k, 1) for k in range(1, 10)),
+        *(float(k) for k in range(1, 21)),
+        *(float(k) for k in range(25, 61, 5)),
+    )
+    linear_amplitudes: tuple[float, ...] = (1.0, *(float(k) for k in range(5, 51, 5)))
+    linear_frequencies: tuple[float, ...] = (0.2, 2.0, 20.0, 50.0)
+    settle: float = 1.0
+    observe: float = 1.0
+    warm_up: float = 300.0
+    standstill: float = 120.0
+
+
+def read(rate: FloatArray, seed: int, **parameters: Any) -> dict[str, FloatArray]:
+    """Return the readings of both sensors and the fused rate.
+
+    Parameters
+    ----------
+    rate : ndarray, shape (n_time,)
+        True rate at the common clock [rad/s].
+    seed : int
+        Seed of the sensors' noise.
+    **parameters : Any
+        Of the filter `allan_srkf`.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_time,)
+        ``mems_gyro``, ``mhd_ars`` and ``fused`` [rad/s].
+    """
+    gyro = load_preset("crs03").model_copy(update={"sample_rate": CLOCK_HZ})
+    readings = {
+        "mems_gyro": gyro.start(CLOCK_HZ, seed, "mems_gyro").process(rate),
+        "mhd_ars": load_preset("mhd03").start(CLOCK_HZ, seed, "mhd_ars").process(rate),
+    }
+    clock = dict.fromkeys(readings, CLOCK_HZ)
+    fused = estimate("allan_srkf", readings, sample_rate_hz=clock, belief="paper2", **parameters).rate
+    return readings | {"fused": fused}
+
+
+def mhd_response(freq_hz: FloatArray) -> ComplexArray:
+    """Return the response of the MHD ARS of `read` at frequencies [Hz], complex, shape (n_freq,) [-]."""
+    return load_preset("mhd03").response(freq_hz)
+
+
+def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, **parameters: Any) -> list[float]:
+    """Return the amplitude of each channel for a sine.
+
+    Parameters
+    ----------
+    freq_hz, amplitude : float
+        The sine [Hz], [deg/s].
+    seed : int
+        Seed of the noise.
+    protocol : Protocol
+        Its times.
+    **parameters : Any
+        Of the filter.
+
+    Returns
+    -------
+    list of float
+        Fourier amplitudes over whole periods, in the order of `CHANNELS` [deg/s].
+    """
+    first = round(protocol.settle * CLOCK_HZ)
+    n_time = first + round(np.ceil(protocol.observe * freq_hz - 1e-9) / freq_hz * CLOCK_HZ)
+    turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / CLOCK_HZ
+    signals = read(amplitude * DEG * np.sin(turns), seed, **parameters)
+    line = np.exp(-1j * turns[first:])
+    return [float(2.0 * np.abs(np.mean(signals[name][first:] * line)) / DEG) for name in CHANNELS]
+
+
+def scale_factor(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
+    """Return indicated over true amplitude, mean over the amplitudes, shape (n_freq, 3) in the order of `CHANNELS` [-].
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the noise.
+    protocol : Protocol
+        Grid and times.
+    **parameters : Any
+        Of the filter.
+    """
+    return np.array(
+        [
+            np.mean(
+                [np.array(amplitudes(f, a, seed, protocol, **parameters)) / a for a in protocol.scale_amplitudes], 0
+            )
+            for f in protocol.scale_frequencies
+        ]
+    )
+
+
+def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
+    """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of `CHANNELS` [-].
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the noise.
+    protocol : Protocol
+        Grid and times.
+    **parameters : Any
+        Of the filter.
+    """
+    truth = np.array(protocol.linear_amplitudes)
+    rows = []
+    for f in protocol.linear_frequencies:
+        found = np.array([amplitudes(f, a, seed, protocol, **parameters) for a in truth])
+        slope, offset = np.polyfit(truth, found, 1)
+        deviation = np.abs(found - truth[:, None] * slope - offset)
+        rows.append(deviation.max(axis=0) / found[-1])
+    return np.array(rows)
+
+
+def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[FloatArray, FloatArray]:
+    """Return Welch densities at standstill, averaged in logarithmic bins.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the noise.
+    protocol : Protocol
+        Times.
+    **parameters : Any
+        Of the filter.
+
+    Returns
+    -------
+    freq_hz, density : ndarray, shapes (n_bin,), (n_bin, 4)
+        Frequency [Hz]; gyro, MHD ARS, fused, and MHD ARS referred to the rate by its response, two-sided [rad^2/s].
+    """
+    signals = read(np.zeros(round((protocol.warm_up + protocol.standstill) * CLOCK_HZ)), seed, **parameters)
+    columns = []
+    for name in CHANNELS:
+        welch = WelchDensity(CLOCK_HZ, round(CLOCK_HZ * min(4.0, protocol.standstill / 2.0)))
+        welch.process(signals[name][round(protocol.warm_up * CLOCK_HZ) :])
+        freq = welch.freq_hz[2:]  # what is below is the window's own leakage
+        columns.append(welch.density[2:])
+    columns.append(columns[1] / np.abs(mhd_response(freq)) ** 2)
+    binned = [log_average(freq, column, bins_per_decade=10) for column in columns]
+    return binned[0][0], np.array([density for _, density in binned]).T
+
+
+def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters: Any) -> Iterator[str]:
+    """Run the whole protocol, write scale_factor.csv, linearity.csv and noise_psd.csv, and yield the tables line by line.
+
+    Parameters
+    ----------
+    seeds : int
+        Seeds 1 to this; every entry is the median over them [-].
+    out : Path
+        Folder to write to.
+    protocol : Protocol, optional
+        The paper's if not given.
+    **parameters : Any
+        Of the filter.
+
+    Yields
+    ------
+    str
+        One line.
+    """
+    protocol = protocol or Protocol()
+    run = range(1, seeds + 1)
+    scale = np.median([scale_factor(seed, protocol, **parameters) for seed in run], axis=0)
+    yield from _table(
+        out / "scale_factor.csv",
+        ["frequency_hz", *CHANNELS],
+        protocol.scale_frequencies,
+        scale,
+        "scale factor, indicated / true",
+    )
+    linear = 100.0 * np.median([linearity(seed, protocol, **parameters) for seed in run], axis=0)
+    columns = ["frequency_hz", *(f"{name}_percent" for name in CHANNELS)]
+    yield from _table(
+        out / "linearity.csv", columns, protocol.linear_frequencies, linear, "linearity, % of the largest reading"
+    )
+    noise = [noise_density(seed, protocol, **parameters) for seed in run]
+    freq, density = noise[0][0], np.median([value for _, value in noise], axis=0)
+    columns = ["frequency_hz", *(f"{name}_rad2_s" for name in (*CHANNELS, "mhd_ars_input_referred"))]
+    _write(out / "noise_psd.csv", columns, freq, density)
+    yield from _claims(protocol, scale[:, 2], linear, freq, density)
+
+
+def _claims(
+    protocol: Protocol, scale: FloatArray, linear: FloatArray, freq: FloatArray, density: FloatArray
+) -> Iterator[str]:
+    low = scale[np.array(protocol.scale_frequencies) < 1.0]
+    half = 50.0 * np.ptp(low) / np.mean(low)
+    judged = np.array(protocol.linear_frequencies) >= 2.0
+    corner = cast("MhdArs", load_preset("mhd03")).channel.corner_freq_hz
+    band = (freq >= corner) & (freq <= 500.0)
+    excess = 10.0 * np.log10(np.max(density[band, 2] / density[band, 3]))
+    yield "fused output beside the paper"
+    yield f"{'':34s}{'paper':>22s}{'target':>16s}{'ours':>26s}"
+    rows = [
+        ("ripple, highest less lowest", "2.5 %", "1 %", f"{100.0 * np.ptp(scale) / np.mean(scale):.3f} %"),
+        (
+            "low band, V/(deg/s)",
+            "0.04 +- 0.0005",
+            "-",
+            f"{PAPER_SCALE * np.mean(low):.5f} +- {PAPER_SCALE * half / 100.0:.1g}",
+        ),
+        (
+            "linearity (MHD ARS), from 2 Hz",
+            "as the MHD ARS",
+            "as the MHD ARS",
+            f"{linear[judged, 2].max():.1e} ({linear[judged, 1].max():.1e}) %",
+        ),
+        (
+            f"noise over MHD ARS, {corner:.1f}-500 Hz",
+            "equal level",
+            "1 dB",
+            f"{excess:.2f} dB",
+        ),
+    ]
+    for row in rows:
+        yield f"{row[0]:34s}{row[1]:>22s}{row[2]:>16s}{row[3]:>26s}"
+
+
+def _table(path: Path, columns: list[str], first: tuple[float, ...], values: FloatArray, title: str) -> Iterator[str]:
+    _write(path, columns, first, values)
+    yield f"{title} ({path})"
+    yield "".join(f"{name:>20s}" for name in columns)
+    for key, row in zip(first, values, strict=True):
+        yield f"{key:20g}" + "".join(f"{value:20.6g}" for value in row)
+    yield ""
+
+
+def _write(path: Path, columns: list[str], first: tuple[float, ...] | FloatArray, values: FloatArray) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows([float(key), *map(float, row)] for key, row in zip(first, values, strict=True))
