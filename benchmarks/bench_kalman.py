@@ -114,9 +114,10 @@ def main() -> None:
         stage.process(blocks)
         step_us = best(functools.partial(stage.process, blocks), 5) / n * 1e6
         plain_us = plain_us or step_us
-        print(
-            f"{name:20s} {step_us:9.3f} us/step   / kalman        {step_us / plain_us:7.2f}   (with blocks; promised: at most 3)"
-        )
+        promise = f"/ kalman        {step_us / plain_us:7.2f}   (with blocks; promised: at most 3)"
+        if name == "wideband":  # a bank of 16 filters: judged by real time
+            promise = f"x real time     {1e6 / RATES['mhd_ars'] / step_us:7.1f}   (with blocks; promised: at least 5)"
+        print(f"{name:20s} {step_us:9.3f} us/step   {promise}")
 
 
 if __name__ == "__main__":
