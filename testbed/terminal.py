@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from testbed.table_facts import TableFacts
 
 _PLAIN_EVERY = 5.0
+# Columns of the terminal: errors of a filter, and gain and phase of one line.
+_TABLE_WIDTH, _LINE_WIDTH = 70, 23
 
 
 @contextmanager
@@ -82,7 +84,7 @@ def _number(value: float | None) -> str:
 def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     """Print the table of errors, the expectations and what was written."""
     console = _console()
-    title = f"{metrics['scenario']}: error against the truth, {metrics['settle_s']:g} s to {metrics['duration_s']:g} s, seed {metrics['seed']}"
+    title = f"{metrics['scenario']}: error against the truth in deg/s, {metrics['settle_s']:g} s to {metrics['duration_s']:g} s, seed {metrics['seed']}"
     lines = sorted(
         {
             line["frequency_hz"]
@@ -90,14 +92,14 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
             for line in row["lines"]
         }
     )
-    # With many lines the table would not fit: the report has them all.
-    shown = lines if len(lines) <= 4 else []
+    # With many lines, or on a narrow terminal, the table would not fit: the report has them all.
+    shown = lines if len(lines) <= 4 and console.width >= _TABLE_WIDTH + _LINE_WIDTH * len(lines) else []
     table = Table(title=title, title_justify="left")
     for heading in (
         "",
-        "RMSE deg/s",
-        "aligned deg/s",
-        "claimed std deg/s",
+        "RMSE",
+        "aligned",
+        "claimed std",
         "x floor",
         "x optimum",
         *(f"{line:g} Hz gain, phase" for line in shown),

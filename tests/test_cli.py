@@ -40,7 +40,10 @@ def test_run_prints_a_table_and_writes_the_run_folder(tmp_path):
     result = call("run", short_file(tmp_path), cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     for text in (
-        "RMSE deg/s",
+        "error against the truth in deg/s",
+        "RMSE",
+        "claimed std",
+        "x optimum",
         "mhd_ars",
         "mems_gyro",
         "kalman",
