@@ -134,7 +134,7 @@ def allan(
 
 @app.command()
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper2.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper1, paper2.")],
     seeds: Annotated[int, typer.Option(min=1, help="Seeds to take the median over.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for the tables; default runs/<paper>.")] = None,
 ) -> None:

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-PAPERS = {"paper2": "testbed.reproduce.paper2"}
-PLANNED = ("paper1", "paper3")
+PAPERS = {"paper1": "testbed.reproduce.paper1", "paper2": "testbed.reproduce.paper2"}
+PLANNED = ("paper3",)
 
 
 def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:

@@ -1,0 +1,78 @@
+"""Paper 1's Table II against the physics of table and sensors."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from testbed.models.motion import MotionProfile
+from testbed.reproduce.paper1 import BASE_HZ, FILTERS, PAPER, SENSORS, SIGNALS, Protocol, errors, report, truth
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SHORT = Protocol(duration=2.0, settle=1.0)
+
+
+@pytest.mark.slow
+def test_one_parameter_set_meets_table_ii_on_all_four_signals(tmp_path: Path) -> None:
+    """Median over ten seeds at or below the paper's own column, and no seed beyond it by half; SHAKF tuned at 0.5 Hz fails at 4 and 10 Hz."""
+    print(*report(10, tmp_path), sep="\n")
+    with (tmp_path / "table_ii.csv").open() as file:
+        table = {(row["signal"], row["name"]): row for row in csv.DictReader(file)}
+    assert len(table) == len(SIGNALS) * (len(SENSORS) + len(FILTERS))
+    for signal in SIGNALS:
+        proposed = PAPER[signal]["arw_shakf"]
+        for name in ("kalman", "arw_shakf", "arw_shakf_literal"):
+            row = table[signal, name]
+            assert float(row["rmse_deg_s"]) <= proposed, row
+            assert float(row["rmse_highest_deg_s"]) <= 1.5 * proposed, row
+    tuned = float(table["0.5 Hz", "shakf"]["rmse_deg_s"])
+    assert tuned <= PAPER["0.5 Hz"]["shakf"]
+    for signal in ("4 Hz", "10 Hz"):
+        assert float(table[signal, "shakf"]["rmse_deg_s"]) >= 10 * tuned
+
+
+def test_the_signals_are_the_papers() -> None:
+    """1 deg/s each; mixed: 5.555 mrad at 0.5 Hz and 50 urad at 10 Hz, 1 and 0.18 deg/s."""
+    t = np.arange(200_000) / BASE_HZ
+    rng = np.random.default_rng()
+    for signal, peaks in (("0.5 Hz", [1.0]), ("4 Hz", [1.0]), ("10 Hz", [1.0]), ("mixed", [1.0, 0.18])):
+        found = [float(np.rad2deg(np.max(np.abs(sine.start(10.0, rng)(t))))) for sine in SIGNALS[signal]]
+        # 5.555 mrad at 0.5 Hz is 0.99991 deg/s, 50 urad at 10 Hz is 0.18000: the paper's own rounding.
+        assert found == pytest.approx(peaks, abs=1e-3)
+
+
+def test_sensors_alone_follow_their_transfer_functions() -> None:
+    """At 10 Hz the closed form of a sine through equation (39): A |G - 1| / sqrt(2), phase included."""
+    rate = np.deg2rad(1.0) * np.sin(2 * np.pi * 10.0 * np.arange(round(2 * BASE_HZ)) / BASE_HZ)
+    found = errors(rate, "10 Hz", 1, SHORT)
+    s = 2j * np.pi * 10.0
+    gyro = (154.537 * s + 15.626) / (5.2175 * s**2 + 148.0 * s + 15.444)
+    mhd = 2200.0 * s / (0.255 * s**2 + 2178.0 * s + 33900.0)
+    # The gyro's pole at 0.1 rad/s still settles and its noise is 0.01 deg/s rms; sx300 meets (39) within 0.2 %.
+    assert found["mems_gyro"][0] == pytest.approx(abs(gyro - 1) / np.sqrt(2), abs=0.02)
+    assert found["mhd_ars"][0] == pytest.approx(abs(mhd - 1) / np.sqrt(2), abs=0.003)
+
+
+def test_the_truth_is_the_table_under_its_servo() -> None:
+    """It follows the command but for the recoil of the platform, 0.11 % of the rate (I_rotor / I_platform = 0.05 / 45)."""
+    rate = truth("10 Hz", SHORT)
+    terms = [sine.start(2.0, np.random.default_rng()) for sine in SIGNALS["10 Hz"]]
+    command = MotionProfile(terms, 0.5, BASE_HZ).process(rate.size).rate[:-1]
+    off = np.max(np.abs(rate - command)[20_000:]) / np.deg2rad(1.0)
+    assert 5e-4 < off < 3e-3
+
+
+def test_table_ii_is_written_with_the_papers_numbers(tmp_path: Path) -> None:
+    lines = list(report(1, tmp_path, SHORT))
+    assert len(lines) == 2 + len(SIGNALS) * (len(SENSORS) + len(FILTERS))
+    with (tmp_path / "table_ii.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    papers = {(row["signal"], row["name"]): row["paper_rmse_deg_s"] for row in rows}
+    assert float(papers["4 Hz", "shakf"]) == 0.1831
+    assert papers["mixed", "mhd_ars"] == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["table_ii.csv"]
