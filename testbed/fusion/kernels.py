@@ -74,8 +74,8 @@ SENSOR = np.dtype(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
-    """Set x = F x and P = F P F' + Q, exactly symmetric."""
+def move(x, F, moved, n):  # pragma: no cover
+    """Set x = F x."""
     for i in range(n):
         total = x.dtype.type(0.0)
         for j in range(n):
@@ -83,6 +83,12 @@ def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
         moved[i] = total
     for i in range(n):
         x[i] = moved[i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q, exactly symmetric."""
+    move(x, F, moved, n)
     for i in range(n):
         for j in range(n):
             work[i, j] = F[i, 0] * P[0, j]
@@ -145,13 +151,7 @@ def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_plain(x, P, F, Q, work, moved, n):  # pragma: no cover
     """Set x = F x and P = F P F' + Q, every element computed for itself."""
-    for i in range(n):
-        total = x.dtype.type(0.0)
-        for j in range(n):
-            total += F[i, j] * x[j]
-        moved[i] = total
-    for i in range(n):
-        x[i] = moved[i]
+    move(x, F, moved, n)
     for i in range(n):
         for j in range(n):
             total = x.dtype.type(0.0)
@@ -218,13 +218,8 @@ def triangularise(A, n, m):  # pragma: no cover
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
     """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'."""
+    move(x, F, moved, n)
     for i in range(n):
-        total = x.dtype.type(0.0)
-        for j in range(n):
-            total += F[i, j] * x[j]
-        moved[i] = total
-    for i in range(n):
-        x[i] = moved[i]
         for j in range(n):
             array[i, j] = F[i, 0] * D[0, j]
             array[i, n + j] = S[i, j]
