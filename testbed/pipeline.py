@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
+# Samples: a second at 20 kHz.
+_BLOCK = 20_000
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class Chain:
         return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
 
 
-def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[RunBlock]]:
+def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Iterator[RunBlock]]:
     """Return the chain of a scenario and the iterator that runs it.
 
     Parameters
@@ -143,10 +145,10 @@ def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[Ru
     scenario : Scenario
         What to run.
     block : float, optional
-        Length of a block [s]; the result does not depend on it.
+        Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = max(round(block * scenario.base_rate_hz), 1)
+    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 
