@@ -53,3 +53,75 @@ def test_round_trip_is_exact(profile: TemperatureProfile) -> None:
 def test_nonsense_is_refused(value: object, message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         TemperatureProfile.model_validate(value, context=BORDER)
+
+
+OVEN = {
+    "start": "20 degC",
+    "steps": [
+        {"hold": "2 h"},
+        {"ramp": "60 degC", "rate": "0.1 K/min"},
+        {"ramp": "-30 degC", "over": "54000 s"},
+        {"hold": "1 h"},
+    ],
+}
+
+
+def test_holds_and_ramps_follow_each_other() -> None:
+    """Paper 3's oven: 7200 s, then 40 K and 90 K at 0.1 K/min; the last temperature is held."""
+    profile = TemperatureProfile.model_validate(OVEN, context=BORDER)
+    times = np.array([0, 7199, 7200, 7800, 31_200, 31_800, 85_200, 100_000], dtype=float)
+    corners = np.interp(times, [0, 7200, 31_200, 85_200], [293.15, 293.15, 333.15, 243.15])
+    got = np.array([profile.at(int(t), 1, 1.0)[0] for t in times])
+    # Sums of numbers of 300 K: a few of their last digits.
+    np.testing.assert_allclose(got, corners, rtol=0, atol=1e-12)
+
+
+def test_a_programme_of_one_ramp_is_the_line() -> None:
+    line = TemperatureProfile(start=280.0, stop=300.1, over=3.0)
+    steps = TemperatureProfile.model_validate({"start": 280.0, "steps": [{"ramp": 300.1, "over": 3.0}]})
+    assert np.array_equal(line.at(0, 5000, 1000.0), steps.at(0, 5000, 1000.0))
+
+
+def test_a_programme_gives_the_same_bits_in_blocks_and_at_any_clock() -> None:
+    profile = TemperatureProfile.model_validate(OVEN, context=BORDER)
+    whole = profile.at(0, 90_000, 1.0)
+    parts = [profile.at(a, n, 1.0) for a, n in ((0, 1), (1, 40_000), (40_001, 49_999))]
+    assert np.array_equal(np.concatenate(parts), whole)
+    np.testing.assert_allclose(profile.at(0, 90_000 * 4, 4.0)[::4], whole, rtol=0, atol=1e-12)
+
+
+def test_a_programme_survives_the_round_trip() -> None:
+    profile = TemperatureProfile.model_validate(OVEN, context=BORDER)
+    written = json.loads(profile.model_dump_json(context=BORDER))
+    assert written["steps"][1] == {"ramp": "333.15 K", "rate": f"{profile.steps[1].rate!r} K/s"}
+    assert "stop" not in written
+    assert TemperatureProfile.model_validate(written, context=BORDER) == profile
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        ({}, "expected hold, or ramp with either rate or over, got nothing"),
+        ({"hold": "1 h", "ramp": "60 degC"}, "got hold and ramp"),
+        ({"ramp": "60 degC"}, "got ramp"),
+        ({"ramp": "60 degC", "rate": "0.1 K/min", "over": "1 h"}, "got ramp and rate and over"),
+        ({"ramp": "60 degC", "rate": "-0.1 K/min"}, "more than 0"),
+        ({"ramp": "60 degC", "rate": "0.1 K"}, "wrong dimension"),
+        ({"hold": "0 s"}, "more than 0"),
+        ({"wait": "1 h"}, "wait"),
+    ],
+)
+def test_a_step_that_is_none_is_refused(step: object, message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        TemperatureProfile.model_validate({"start": "20 degC", "steps": [step]}, context=BORDER)
+
+
+def test_a_line_and_steps_at_once_are_refused() -> None:
+    with pytest.raises(ValidationError, match="either stop and over or steps, got start and stop and over and steps"):
+        TemperatureProfile.model_validate({**OVEN, **RAMP}, context=BORDER)
+
+
+def test_the_schema_offers_all_three() -> None:
+    schema = TemperatureProfile.model_json_schema()
+    text = json.dumps(schema)
+    assert all(f'"{word}"' in text for word in ("start", "stop", "over", "steps", "hold", "ramp", "rate"))
