@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from testbed.models.turntable import TurntableParameters
     from testbed.sensors.base import Sensor
 
+# Base samples of the default detail, at the least.
+_FEWEST_DETAIL = 1000
+
 
 class Frame(Part):
     """The keys of a scenario that are no parts of their own.
@@ -44,7 +47,7 @@ class Frame(Part):
     bandwidth : float, optional
         Bandwidth W of the noise floor in the metrics [Hz].
     detail : tuple of two floats, optional
-        From when to when the recording holds every sample [s]; two seconds after `settle` if not given.
+        From when to when the recording holds every sample [s]; two seconds after `settle` if not given, at least 1000 samples.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
@@ -131,7 +134,8 @@ class Scenario:
     @property
     def detail(self) -> tuple[float, float]:
         """From when to when the recording holds every sample [s]."""
-        start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + 2.0)
+        length = max(2.0, _FEWEST_DETAIL / self.base_rate_hz)
+        start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + length)
         return start, min(stop, self.frame.duration)
 
     def profile(self, ramp_in: float | None = None) -> MotionProfile:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from testbed.recording.stream import Clock
 
 ZOOM = 0.05  # s on each side of the time cursor
+SHOWN = 0.5  # s of the window recorded sample by sample
+FEWEST = 1000  # samples in both, at the least
 LEGEND = 0.25  # room for the legend, as a share of the span
 DIAGNOSTICS = {  # prefix of the name: quantity and unit
     "R_": ("Adapted R", "(rad/s)²"),
@@ -60,7 +62,8 @@ def blueprint(
     rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
     rates += [f"/fusion/{n}/rate" for n in filters]
     truth_and_filters = ["/truth/rate", *(f"/fusion/{n}/rate" for n in filters)]
-    zoom = (window[0], min(window[0] + 0.5, duration))
+    least = FEWEST / clock.sample_rate_hz
+    zoom, around = (window[0], min(window[0] + max(SHOWN, least), duration)), max(ZOOM, 0.5 * least)
     span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
     left: list[rrb.View | rrb.Container] = [_turntable(model)]
     if channels:
@@ -71,7 +74,7 @@ def blueprint(
         _tabs(
             [
                 _plot(f"Rate, {span} [rad/s]", rates, zoom),
-                _at_cursor("Rate ±50 ms at the cursor [rad/s]", rates),
+                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
                 _plot("Truth and estimates [rad/s]", truth_and_filters, (0.0, duration)),
             ]
         ),
@@ -87,13 +90,24 @@ def blueprint(
                 ]
             )
         )
+    thermometers = [entity for entity in entities if entity.endswith("/temperature")]
+    if thermometers:
+        drifts = [entity for entity in entities if entity.endswith("/drift")]
+        right.append(
+            _tabs(
+                [
+                    _plot("Temperature inside [K]", thermometers, (0.0, duration)),
+                    _plot("True thermal drift [rad/s]", drifts, (0.0, duration)),
+                ]
+            )
+        )
     if diagnostics := _diagnostics(entities, sensors, duration):
         right.append(_tabs(diagnostics))
     shares = {"row_shares": [3, 2]} if channels else {}
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(*left, **shares),
-            rrb.Vertical(*right, row_shares=[5, 6, 4, 4][: len(right)]),
+            rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4][: len(right)]),
             column_shares=[2, 3],
         ),
         rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed"),
@@ -119,10 +133,14 @@ def _plot(name: str, contents: Iterable[str], span: tuple[float, float]) -> rrb.
     return _series(name, contents, data, shown)
 
 
-def _at_cursor(name: str, contents: Iterable[str]) -> rrb.TimeSeriesView:
+def _short(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds >= 1.0 else f"{1e3 * seconds:g} ms"
+
+
+def _at_cursor(name: str, contents: Iterable[str], around: float) -> rrb.TimeSeriesView:
     at = rrb.TimeRangeBoundary.cursor_relative
-    data = rr.TimeRange(start=at(seconds=-ZOOM), end=at(seconds=ZOOM))
-    shown = rr.TimeRange(start=at(seconds=-ZOOM * (1 + 2 * LEGEND)), end=at(seconds=ZOOM))
+    data = rr.TimeRange(start=at(seconds=-around), end=at(seconds=around))
+    shown = rr.TimeRange(start=at(seconds=-around * (1 + 2 * LEGEND)), end=at(seconds=around))
     return _series(name, contents, data, shown)
 
 

@@ -33,7 +33,7 @@ FLUSH_TIMEOUT = 60.0  # s; a disk slower than this for the last few MB is taken 
 
 
 class RecordingWriter:
-    """Write a run to an .rrd file: bodies, rates, errors, diagnostics and velocity profiles on the timeline `sim_time`.
+    """Write a run to an .rrd file: bodies, rates, errors, temperatures, diagnostics and velocity profiles on the timeline `sim_time`.
 
     A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample, and, if it
     is a rate or an error, every sample inside `detail`. Samples that are not finite are left out.
@@ -107,6 +107,10 @@ class RecordingWriter:
         for name, readings in block.sensors.items():
             key = f"sensors/{name}"
             self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+        for name, temperature in block.temperatures.items():
+            key, drift = f"sensors/{name}", block.drifts[name]
+            self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
+            self._add(f"/truth/{name}/drift", drift, 1, f"{name} [rad/s]", key, detailed=False)
         reference = truth[-block.start % self._fusion_stride :: self._fusion_stride]
         for name, estimate in block.fusion.items():
             key = f"fusion/{name}"

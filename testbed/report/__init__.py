@@ -11,7 +11,7 @@ from markupsafe import Markup
 from testbed.errors import Problem, ScenarioError
 from testbed.palette import series_colors
 from testbed.report.digest import Digest, digest_run
-from testbed.report.figures import errors_figure, rates_figure, spectrum_figure
+from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
 from testbed.report.numbers import fixed, plain, significant
 from testbed.report.svg import svg_text
@@ -101,5 +101,7 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Markup]:
     if digest.filter_errors:
         drawn["errors"] = errors_figure(digest, colors)
     drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
+    if digest.thermal:
+        drawn["thermal"] = thermal_figure(digest, colors)
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
     return {name: Markup(svg_text(figure, name)) for name, figure in drawn.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,8 @@ N_BINS = 700
 FIRST_FREQ = 2
 # Lost readings in a row that a straight line may stand for.
 LONGEST_BRIDGE = 10
+# Samples of a zoom without lines, at the least.
+FEWEST = 1000
 
 
 @dataclass(frozen=True)
@@ -48,8 +50,16 @@ class ErrorTrace:
 
 
 @dataclass(frozen=True)
+class ThermalTrace:
+    """What the thermometer of a sensor read [K], and the sensor's true thermal drift [rad/s]."""
+
+    temperature: Envelope
+    drift: Envelope
+
+
+@dataclass(frozen=True)
 class Digest:
-    """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter."""
+    """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter; `thermal` of those with a thermometer."""
 
     duration_s: float
     settle_s: float
@@ -58,12 +68,13 @@ class Digest:
     rates: dict[str, RateTrace]
     sensor_errors: dict[str, ErrorTrace]
     filter_errors: dict[str, ErrorTrace]
+    thermal: dict[str, ThermalTrace] = field(default_factory=dict)
 
 
-def zoom_window(metrics: RunMetrics) -> tuple[float, float]:
-    """Return (start, stop) [s] of the zoom: two periods of the slowest line, or 1 s, from settle on, as far as the run reaches."""
+def zoom_window(metrics: RunMetrics, still: float = 1.0) -> tuple[float, float]:
+    """Return (start, stop) [s] of the zoom: two periods of the slowest line, or `still` [s], from settle on, as far as the run reaches."""
     lines = [freq for freq in metrics.line_freq_hz if freq > 0]
-    length = 2.0 / lines[0] if lines else 1.0
+    length = 2.0 / lines[0] if lines else still
     return metrics.settle_s, min(metrics.settle_s + length, metrics.duration_s)
 
 
@@ -87,8 +98,8 @@ def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
     ScenarioError
         If ``run.nc`` lacks a signal that ``metrics.json`` names, or its units or time base are wrong.
     """
-    zoom = zoom_window(metrics)
     truth = data.signal("truth", "rate")
+    zoom = zoom_window(metrics, max(1.0, FEWEST / truth.sample_rate_hz))
     rates = {}
     for group in ("commanded", "truth"):
         signal = data.signal(group, "rate")
@@ -107,7 +118,20 @@ def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
         rates=rates,
         sensor_errors={name: errors[f"sensors/{name}"] for name in metrics.sensors},
         filter_errors={name: errors[f"fusion/{name}"] for name in metrics.fusion},
+        thermal={name: _thermal(data, name) for name in metrics.sensors if data.has(f"sensors/{name}", "temperature")},
     )
+
+
+def _thermal(data: RunData, name: str) -> ThermalTrace:
+    temperature = data.signal(f"sensors/{name}", "temperature", "K")
+    return ThermalTrace(_whole(temperature), _whole(data.signal("truth", f"{name}_drift")))
+
+
+def _whole(signal: Signal) -> Envelope:
+    envelope = Envelope(0, signal.n_time, signal.sample_rate_hz, N_BINS)
+    for first in range(0, signal.n_time, BLOCK):
+        envelope.process(first, signal.read(first, min(first + BLOCK, signal.n_time)))
+    return envelope
 
 
 def _rate_trace(signal: Signal, zoom: tuple[float, float]) -> RateTrace:

@@ -1,4 +1,4 @@
-"""The three figures of a report."""
+"""The figures of a report."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from testbed.report.drawing import HOURS_FROM, WIDTH_IN, arrange, draw, label, rate_unit, time_axis
 from testbed.report.numbers import decade, plain, significant
 from testbed.report.svg import INK, STYLE
 
@@ -20,10 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from testbed.report.digest import Digest, ErrorTrace
-    from testbed.report.envelope import Envelope
     from testbed.report.folder import FloorDensity
 
-WIDTH_IN = 9.2
 MAX_LABELLED_LINES = 6
 DOTTED = (0, (1.2, 2.2))
 # Beside the color, so that lines can be told apart without it.
@@ -33,46 +32,6 @@ DASHES: tuple[tuple[float, tuple[float, ...] | None], ...] = (
     (0, (3, 1.2)),
     (0, (7, 1.2, 1.5, 1.2)),
 )
-
-
-def _draw(axes: Axes, envelope: Envelope, color: str, width: float, alpha: float = 1.0) -> None:
-    """Fill between the extremes, with an outline so that a quiet signal is still a line."""
-    low, high = np.degrees(envelope.low), np.degrees(envelope.high)
-    axes.fill_between(
-        envelope.time, low, high, facecolor=color, edgecolor=color, linewidth=width, alpha=alpha, joinstyle="round"
-    )
-
-
-def _arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:
-    """Put the legend above the axes, in equal rows as wide as its longest name allows, and set the margins in inches.
-
-    Solving for the layout would cost as much time as drawing the figure.
-    """
-    entry_pt = 45.0 + 5.4 * max(len(str(handle.get_label())) for handle in handles)
-    n_rows = -(-len(handles) // max(1, int(72.0 * WIDTH_IN / entry_pt)))
-    width, height = figure.get_size_inches()
-    top = height - 0.08 - 0.2 * n_rows
-    figure.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, top / height),
-        ncols=-(-len(handles) // n_rows),
-        borderaxespad=0.0,
-    )
-    rows = len(figure.axes)
-    each = (top - 0.3 - 0.48) / rows
-    figure.subplots_adjust(
-        left=0.82 / width,
-        right=1.0 - 0.14 / width,
-        bottom=0.48 / height,
-        top=(top - 0.3) / height,
-        hspace=min(gap_in / max(each - gap_in, 0.1), 1.0),
-    )
-
-
-def _label(group: str) -> str:
-    """Return the instance's name; a dollar sign would start a formula."""
-    return group.split("/", 1)[-1].replace("$", r"\$")
 
 
 def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
@@ -88,8 +47,10 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
     Returns
     -------
     Figure
-        Two axes, deg/s against s.
+        Two axes, deg/s against s; deg/h for slow rates, and hours for a long run.
     """
+    highest = max(np.nanmax(np.fmax(np.abs(t.whole.low), np.abs(t.whole.high))) for t in digest.rates.values())
+    unit, scale = rate_unit(float(highest))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 5.4))
         above, below = figure.subplots(2, 1, height_ratios=[2, 3])
@@ -99,27 +60,31 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         widths = {"truth": 4.2, **dict.fromkeys(sensors, 1.4)}
         widths |= {group: 2.2 * 0.7**i for i, group in enumerate(filters)}
         for group in [*sensors, "truth"]:
-            _draw(above, digest.rates[group].whole, colors[group], 0.9)
+            draw(above, digest.rates[group].whole, colors[group], 0.9, scale=scale)
         for group, width in widths.items():
-            _draw(below, digest.rates[group].zoom, colors[group], width)
+            draw(below, digest.rates[group].zoom, colors[group], width, scale=scale)
         commanded = digest.rates["commanded"].zoom
-        middle = np.degrees((commanded.low + commanded.high) / 2)
-        below.plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
+        middle = scale * (commanded.low + commanded.high) / 2
+        # A command of nothing would only stretch the scale of a table that turns with the Earth.
+        moved = bool(np.any(middle))
+        if moved:
+            below.plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
         above.axvspan(*digest.zoom_s, color=INK, alpha=0.08, linewidth=0)
         above.set_title("Whole run (shaded: the zoom below)", loc="left")
         below.set_title(f"Zoom, {plain(digest.zoom_s[0])} s to {plain(digest.zoom_s[1])} s", loc="left")
         above.set_xlim(0, digest.duration_s)
         below.set_xlim(*digest.zoom_s)
         for axes in (above, below):
-            axes.set_ylabel("rate [deg/s]")
+            axes.set_ylabel(f"rate [{unit}]")
             axes.grid(visible=True)
-        below.set_xlabel("time [s]")
+        time_axis(above, digest.duration_s, named=digest.duration_s >= HOURS_FROM)
+        time_axis(below, digest.zoom_s[1] - digest.zoom_s[0])
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=_label(group))
+            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=label(group))
             for group, width in widths.items()
         ]
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
-        _arrange(figure, [dotted, *handles], gap_in=0.62)
+        arrange(figure, [dotted, *handles] if moved else handles, gap_in=0.62)
     return figure
 
 
@@ -148,22 +113,22 @@ def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
             axes.axvspan(0, digest.settle_s, color=INK, alpha=0.08, linewidth=0)
             inside = "undefined" if trace.inside is None else f"{100 * trace.inside:.1f} %"
             axes.set_title(
-                f"{_label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
+                f"{label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
             )
-        panels[-1].set_xlabel("time [s]")
         panels[-1].set_xlim(0, digest.duration_s)
+        time_axis(panels[-1], digest.duration_s)
         handles: list[Line2D | Patch] = [
             Patch(facecolor="#8a8a8a", label="error (its extremes)"),
             Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (5, 2)), label="±2 std predicted"),
         ]
         if digest.settle_s > 0:
             handles.append(Patch(facecolor=INK, alpha=0.08, label="before settle, not judged"))
-        _arrange(figure, handles)
+        arrange(figure, handles)
     return figure
 
 
 def _error_panel(axes: Axes, trace: ErrorTrace, color: str, limit: float) -> None:
-    _draw(axes, trace.whole, color, 0.6)
+    draw(axes, trace.whole, color, 0.6)
     if trace.std is not None:
         for sign in (-2.0, 2.0):
             band = sign * np.degrees(trace.std.high)
@@ -233,7 +198,7 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
                     color=colors[f"{kind}/{name}"],
                     linewidth=width,
                     linestyle=DASHES[i % len(DASHES)],
-                    label=_label(name),
+                    label=label(name),
                 )
         if floor is not None:
             handles += axes.plot(
@@ -245,7 +210,7 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
                 label="noise floor",
             )
         _frame_spectrum(axes, digest)
-        _arrange(figure, handles)
+        arrange(figure, handles)
     return figure
 
 
@@ -275,3 +240,43 @@ def _frame_spectrum(axes: Axes, digest: Digest) -> None:
             f"{plain(freq)} Hz", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
+
+
+def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
+    """Draw what the temperature does to the sensors that have a thermometer: its readings above, error and true drift below.
+
+    Parameters
+    ----------
+    digest : Digest
+        Traces of the run.
+    colors : Mapping
+        Group (``truth``, ``sensors/fog``, ...) to color.
+
+    Returns
+    -------
+    Figure
+        Two axes, degC and deg/h (or deg/s) against s or h.
+    """
+    errors = {name: digest.sensor_errors[name].whole for name in digest.thermal}
+    unit, scale = rate_unit(max(float(np.nanmax(np.fmax(-error.low, error.high))) for error in errors.values()))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 5.0))
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 3])
+        handles: list[Line2D | Patch] = []
+        for i, (name, trace) in enumerate(digest.thermal.items()):
+            color, dashes = colors[f"sensors/{name}"], DASHES[i % len(DASHES)]
+            inside = (trace.temperature.low + trace.temperature.high) / 2 - 273.15
+            above.plot(trace.temperature.time, inside, color=color, linewidth=1.4)
+            draw(below, errors[name], color, 0.6, alpha=0.45, scale=scale)
+            drift = scale * (trace.drift.low + trace.drift.high) / 2
+            below.plot(trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=dashes)
+            handles.append(Patch(facecolor=color, label=f"{label(name)}: thermometer, error"))
+            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dashes, label="true thermal drift"))
+        above.set_ylabel("temperature [°C]")
+        below.set_ylabel(f"error [{unit}]")
+        below.set_xlim(0, digest.duration_s)
+        time_axis(below, digest.duration_s)
+        for axes in (above, below):
+            axes.grid(visible=True)
+        arrange(figure, handles)
+    return figure

@@ -167,6 +167,10 @@ class RunData:
             raise _bad(self._path, key, f"expected at least 2 samples along time {time.shape}, got {values.shape}")
         return Signal(values, self._sample_rate(f"{group}/time", time))
 
+    def has(self, group: str, name: str) -> bool:
+        """Return whether there is a variable `name` in `group`."""
+        return f"{group}/{name}" in self._file
+
     def _sample_rate(self, key: str, time: Any) -> float:
         first, last = float(time[0]), float(time[-1])
         if first != 0.0 or not last > 0.0:

@@ -103,6 +103,8 @@ class SyntheticRun:
                     for name, rate in self.estimates.items()
                 },
                 profiles={"mhd_ars": (self.heights, self.profiles[pose])},
+                temperatures={},
+                drifts={},
             )
 
     def writer(self, path: Path, **changes: Any) -> RecordingWriter:
