@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from testbed.table_facts import TableFacts
 
 _PLAIN_EVERY = 5.0
+# A tenth of the Earth's rate [deg/s].
+_SLOW = 1.5 / 3600.0
 # Columns of the terminal: errors of a filter, and gain and phase of one line.
 _TABLE_WIDTH, _LINE_WIDTH = 70, 23
 
@@ -84,7 +86,8 @@ def _number(value: float | None) -> str:
 def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     """Print the table of errors, the expectations and what was written."""
     console = _console()
-    title = f"{metrics['scenario']}: error against the truth in deg/s, {metrics['settle_s']:g} s to {metrics['duration_s']:g} s, seed {metrics['seed']}"
+    unit, scale = _error_unit(metrics)
+    title = f"{metrics['scenario']}: error against the truth in {unit}, {metrics['settle_s']:g} s to {metrics['duration_s']:g} s, seed {metrics['seed']}"
     lines = sorted(
         {
             line["frequency_hz"]
@@ -94,8 +97,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     )
     # With many lines, or on a narrow terminal, the table would not fit: the report has them all.
     shown = lines if len(lines) <= 4 and console.width >= _TABLE_WIDTH + _LINE_WIDTH * len(lines) else []
-    table = Table(title=title, title_justify="left")
-    for heading in (
+    headings = (
         "",
         "RMSE",
         "aligned",
@@ -103,12 +105,13 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         "x floor",
         "x optimum",
         *(f"{line:g} Hz gain, phase" for line in shown),
-    ):
-        table.add_column(heading, justify="left" if not heading else "right", no_wrap=True)
-    for kind in ("sensors", "fusion"):
-        for name, row in metrics[kind].items():
-            table.add_row(*_row(name, row, shown), end_section=name == list(metrics[kind])[-1])
-    console.print(table)
+    )
+    rows = {
+        kind: [_row(name, row, shown, scale) for name, row in metrics[kind].items()] for kind in ("sensors", "fusion")
+    }
+    # Not the table's own title, which would be folded to a narrow table's width.
+    console.print(f"[italic]{title}[/italic]", soft_wrap=True, highlight=False)
+    _print_errors(console, headings, rows)
     for name, row in metrics["sensors"].items():
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
@@ -119,6 +122,26 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
             f"expected {bound['subject']} {bound['metric']} {bound['bound']}: {_number(bound['value'])} {verdict}"
         )
     console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+
+
+def _print_errors(console: Console, headings: Sequence[str], rows: Mapping[str, list[list[str]]]) -> None:
+    """Print the columns that have a value, a line under each kind of source."""
+    cells = [row for kind in rows.values() for row in kind]
+    table = Table()
+    kept = [i for i in range(len(headings)) if i < 2 or any(row[i] != "-" for row in cells)]
+    for i in kept:
+        table.add_column(headings[i], justify="right" if i else "left", no_wrap=True)
+    for kind in rows.values():
+        for row in kind:
+            table.add_row(*(row[i] for i in kept), end_section=row is kind[-1])
+    console.print(table)
+
+
+def _error_unit(metrics: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit of the errors and what deg/s is multiplied by for it: deg/h where all are below a tenth of the Earth's rate."""
+    errors = [row["rmse_deg_s"] for kind in ("sensors", "fusion") for row in metrics[kind].values()]
+    known = [error for error in errors if error is not None]
+    return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
 
 
 def _print_table(console: Console, table: Mapping[str, Any]) -> None:
@@ -137,7 +160,8 @@ def _print_table(console: Console, table: Mapping[str, Any]) -> None:
 
 def _step(step: float, factor: float, error: float | None) -> str:
     measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
-    return f"integration step {1e6 * step:g} us, {factor:g} times the hold{measured}"
+    length = f"{step:g} s" if step >= 1.0 else f"{1e6 * step:g} us"
+    return f"integration step {length}, {factor:g} times the hold{measured}"
 
 
 def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
@@ -150,10 +174,11 @@ def _gain(lines: Sequence[Mapping[str, Any]]) -> str:
     return f" ({change} at {_number(worst['frequency_hz'])} Hz)"
 
 
-def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
+def _row(name: str, row: Mapping[str, Any], shown: list[float], scale: float) -> list[str]:
     rmse = row["rmse_deg_s"]
+    errors = (rmse, row["rmse_aligned_deg_s"], row.get("mean_std_deg_s"))
     gains = {line["frequency_hz"]: line for line in row["lines"]}
-    cells = [name, _number(rmse), _number(row["rmse_aligned_deg_s"]), _number(row.get("mean_std_deg_s"))]
+    cells = [name, *(_number(None if error is None else scale * error) for error in errors)]
     bounds = row.get("floor_rmse_deg_s"), row.get("optimum_rmse_deg_s")
     cells += ["-" if not bound or rmse is None else f"{rmse / bound:.1f}" for bound in bounds]
     for line in shown:

@@ -73,6 +73,8 @@ def test_temperature_and_drift_are_results_in_memory_and_on_disk(tmp_path):
     for name in ("rate", "temperature"):
         assert np.array_equal(run.sensors["fog"][name], stored.sensors["fog"][name])
     assert np.array_equal(run.truth.fog_drift, stored.truth.fog_drift)
+    page = (tmp_path / "run/report.html").read_text()
+    assert 'aria-label="Temperature and thermal drift"' in page
     import h5py
 
     with h5py.File(tmp_path / "run/run.nc") as file:
@@ -151,3 +153,30 @@ def test_the_shipped_cycle_is_the_papers_programme():
     assert [T[0], T[7200], T[31_200], T[85_200]] == pytest.approx([20, 20, 60, -30], abs=1e-9)
     drift = scenario.sensors["fog"].thermal.bias(T[:-1] + 273.15, 1.0)
     assert np.rad2deg(np.std(drift)) * 3600.0 == pytest.approx(0.096, abs=1e-3)
+
+
+def test_a_day_is_drawn_in_hours_and_degrees_per_hour():
+    from matplotlib.figure import Figure
+
+    from testbed.report.drawing import rate_unit, time_axis
+
+    axes = Figure().subplots()
+    axes.set_xlim(0, 85_200)
+    time_axis(axes, 85_200.0)
+    marks = [f"{axes.xaxis.get_major_formatter()(t, 0)}" for t in axes.xaxis.get_majorticklocs() if 0 <= t <= 85_200]
+    assert marks == [str(h) for h in range(0, 24, 2)]
+    assert axes.get_xlabel() == "time [h]"
+    earth = 7.292115e-5
+    assert rate_unit(earth) == ("deg/h", pytest.approx(np.rad2deg(3600.0)))
+    assert rate_unit(2 * earth) == ("deg/s", pytest.approx(np.rad2deg(1.0)))
+
+
+def test_the_terminal_shows_small_errors_in_degrees_per_hour_and_no_empty_column(tmp_path, capsys):
+    from testbed.terminal import print_metrics
+
+    run = testbed.run(load(tmp_path))
+    print_metrics(run.metrics, tmp_path)
+    printed = capsys.readouterr().out
+    assert "error against the truth in deg/h" in printed
+    assert f"{3600.0 * run.metrics['sensors']['fog']['rmse_deg_s']:.4g}" in printed
+    assert "claimed std" not in printed

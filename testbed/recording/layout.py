@@ -50,7 +50,7 @@ def blueprint(
     Parameters
     ----------
     entities : sequence of str
-        Paths of the scalar signals.
+        Paths of the scalar signals that are to be seen.
     sensors, filters, channels : sequence of str
         Names of the sensors, of the filters and of the sensors that have a velocity profile.
     model : mujoco.MjModel
@@ -60,7 +60,7 @@ def blueprint(
     """
     window, duration = clock.detail, clock.n_time / clock.sample_rate_hz
     rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
-    rates += [f"/fusion/{n}/rate" for n in filters]
+    rates = [rate for rate in rates if rate in entities] + [f"/fusion/{n}/rate" for n in filters]
     truth_and_filters = ["/truth/rate", *(f"/fusion/{n}/rate" for n in filters)]
     least = FEWEST / clock.sample_rate_hz
     zoom, around = (window[0], min(window[0] + max(SHOWN, least), duration)), max(ZOOM, 0.5 * least)

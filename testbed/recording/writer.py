@@ -97,11 +97,13 @@ class RecordingWriter:
         self._signals: dict[str, Signal] = {}
         self._world = World(self._recording, model, {name: self._colors[f"sensors/{name}"] for name in sensor_rates})
         self._channels: dict[str, Channel] = {}
+        self._moved = False
         self._open = True
 
     def write(self, block: RunBlock) -> None:
         """Add the next block of the run."""
         truth = block.truth.rate
+        self._moved |= bool(np.any(block.command.rate))
         self._add("/commanded/rate", block.command.rate[: truth.size], 1, "commanded [rad/s]", "commanded", 1.0)
         self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
         for name, readings in block.sensors.items():
@@ -193,8 +195,10 @@ class RecordingWriter:
             self._channels[name].write(index, profiles)
 
     def _blueprint(self) -> rr.blueprint.Blueprint:
+        # A command of nothing would only stretch the scale of a table that turns with the Earth.
+        hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
-            entities=list(self._signals),
+            entities=[entity for entity in self._signals if entity not in hidden],
             sensors=list(self._strides),
             filters=self._fusion_names,
             channels=list(self._channels),

@@ -211,3 +211,29 @@ def test_the_unit_of_the_shupe_term() -> None:
     """0.45 (deg/h)/(K/min) is 0.45 deg/h at 1 K/min."""
     model = FogThermal.model_validate({"shupe": "0.45 deg/h/(K/min)"}, context={"border": True})
     assert model.shupe / 60.0 == pytest.approx(np.deg2rad(0.45) / 3600.0, rel=1e-12, abs=0)
+
+
+def test_terms_alone_over_the_papers_oven() -> None:
+    """The table of docs/fog.md: standard deviation of each group of terms alone [deg/h]."""
+    from testbed.models.temperature import TemperatureProfile
+    from testbed.sensors import load_preset
+
+    ramps = [{"hold": 7200.0}, {"ramp": 333.15, "over": 24_000.0}, {"ramp": 243.15, "over": 54_000.0}]
+    oven = TemperatureProfile.model_validate({"start": 293.15, "steps": ramps}).at(0, 85_200, 1.0)
+    model = load_preset("fog_paper3").thermal
+    groups = {
+        "statics": ("linear", "quadratic", "cubic"),
+        "Shupe": ("shupe", "shupe_temperature"),
+        "gradient": ("gradient",),
+        "hysteresis": ("hysteresis",),
+    }
+    zero = {name: 0.0 for names in groups.values() for name in names} | {"hysteresis": (0.0, 0.0)}
+    alone = {
+        group: model.model_copy(update={**zero, **{name: getattr(model, name) for name in names}}).bias(oven, 1.0)
+        for group, names in groups.items()
+    }
+    for group, bias in alone.items():
+        print(f"{group}: {np.rad2deg(bias.std()) * 3600.0:.3f} deg/h")
+    # The terms add up, and the hysteresis is what the half-widths allow: 4 K at 2e-3 and 12 K at 1e-3 deg/h/K to both sides.
+    np.testing.assert_allclose(sum(alone.values()), model.bias(oven, 1.0), rtol=0, atol=1e-18)
+    assert np.rad2deg(np.ptp(alone["hysteresis"])) * 3600.0 == pytest.approx(0.04, rel=1e-6)
