@@ -269,9 +269,10 @@ def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
             above.plot(trace.temperature.time, inside, color=color, linewidth=1.4)
             draw(below, errors[name], color, 0.6, alpha=0.45, scale=scale)
             drift = scale * (trace.drift.low + trace.drift.high) / 2
-            below.plot(trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=dashes)
             handles.append(Patch(facecolor=color, label=f"{label(name)}: thermometer, error"))
-            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dashes, label="true thermal drift"))
+            handles += below.plot(
+                trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=dashes, label="true thermal drift"
+            )
         above.set_ylabel("temperature [°C]")
         below.set_ylabel(f"error [{unit}]")
         below.set_xlim(0, digest.duration_s)
