@@ -111,7 +111,8 @@ class Fog(Sensor, GyroTerms):
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate, infinite above half the sample rate; see `Sensor.input_noise_psd`."""
-        seen = freq_hz <= 0.5 * self.sample_rate
+        # A grid that ends at half the sample rate may end a rounding above it.
+        seen = freq_hz <= 0.5 * self.sample_rate * (1.0 + 1e-9)
         density = np.full(freq_hz.shape, np.inf)
         gain = np.abs(self.response(freq_hz[seen])) ** 2
         density[seen] = self.noise_psd(freq_hz[seen], self.sample_rate) / gain
