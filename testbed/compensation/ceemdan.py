@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -77,35 +78,22 @@ def ceemdan(
     """
     residual = checked_signal(signal)
     workers = (os.cpu_count() or 1) if threads is None else threads
-    for name, value in (("trials", trials), ("sifts", sifts), ("threads", workers)):
-        check_count(name, value)
-    if not 0.0 <= noise < np.inf:
-        msg = f"noise: expected a finite ratio of at least 0, got {noise}"
-        raise ValueError(msg)
-    if variant not in get_args(Variant):
-        msg = f"variant: expected one of {', '.join(get_args(Variant))}, got {variant!r}"
-        raise ValueError(msg)
-
+    _check(variant, noise, trials=trials, sifts=sifts, threads=workers)
     whites = np.empty((trials, residual.size))
     chunks = [whites[start : start + CHUNK] for start in range(0, trials, CHUNK)]
     modes: list[FloatArray] = []
     with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(lambda i: random_stream(seed, "ceemdan", str(i)).standard_normal(out=whites[i]), range(trials)))
         for _ in while_modes_are_left(residual, sifts):
-            stage, amplitude, before = len(modes), noise * residual.std(), residual.copy()
-            if stage == 0:
-                list(
-                    pool.map(
-                        lambda i: random_stream(seed, "ceemdan", str(i)).standard_normal(out=whites[i]), range(trials)
-                    )
-                )
-            parts = pool.map(lambda chunk: _sum_of_rest(before, chunk, amplitude, variant, stage, sifts), chunks)
+            before, amplitude = residual.copy(), noise * residual.std()
+            parts = pool.map(partial(_sum_of_rest, before, amplitude, variant, len(modes), sifts), chunks)
             residual[:] = sum(parts) / trials
             modes.append(before - residual)
     return np.stack([*modes, residual])
 
 
 def _sum_of_rest(
-    signal: FloatArray, whites: FloatArray, amplitude: float, variant: Variant, stage: int, sifts: int
+    signal: FloatArray, amplitude: float, variant: Variant, stage: int, sifts: int, whites: FloatArray
 ) -> FloatArray:
     """Return the sum over trials of what one more mode leaves of the signal; takes the noise's own mode out of `whites`."""
     total = np.zeros(signal.size)
@@ -113,6 +101,7 @@ def _sum_of_rest(
         added = amplitude * _noise_mode(white, variant, stage, sifts)
         noisy = signal + added
         total += noisy - first_mode(noisy, sifts)
+        # The classic variant averages modes: the added noise stays in them.
         if variant == "classic":
             total -= added
     return total
@@ -125,3 +114,15 @@ def _noise_mode(white: FloatArray, variant: Variant, stage: int, sifts: int) -> 
     mode: FloatArray = first_mode(white, sifts)
     white -= mode
     return mode / mode.std() if stage == 0 and mode.any() else mode
+
+
+def _check(variant: str, noise: float, **counts: int) -> None:
+    """Refuse what cannot be decomposed with."""
+    for name, value in counts.items():
+        check_count(name, value)
+    if not 0.0 <= noise < np.inf:
+        msg = f"noise: expected a finite ratio of at least 0, got {noise}"
+        raise ValueError(msg)
+    if variant not in get_args(Variant):
+        msg = f"variant: expected one of {', '.join(get_args(Variant))}, got {variant!r}"
+        raise ValueError(msg)
