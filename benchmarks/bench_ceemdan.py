@@ -29,7 +29,10 @@ def record(n_time: int) -> FloatArray:
 
 def processor_time() -> float:
     """Return the processor time of this process and its finished children [s]."""
-    return sum(resource.getrusage(who).ru_utime + resource.getrusage(who).ru_stime for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(
+        resource.getrusage(who).ru_utime + resource.getrusage(who).ru_stime
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
 
 
 def timed(label: str, function, *args, **kwargs) -> tuple[float, float, FloatArray]:
@@ -37,7 +40,10 @@ def timed(label: str, function, *args, **kwargs) -> tuple[float, float, FloatArr
     wall, cpu = time.perf_counter(), processor_time()
     modes = function(*args, **kwargs)
     wall, cpu = time.perf_counter() - wall, processor_time() - cpu
-    print(f"{label:<44}{modes.shape[1]:>8} samples {wall:8.2f} s {cpu:8.2f} s CPU {modes.shape[0] - 1:4d} modes", flush=True)
+    print(
+        f"{label:<44}{modes.shape[1]:>8} samples {wall:8.2f} s {cpu:8.2f} s CPU {modes.shape[0] - 1:4d} modes",
+        flush=True,
+    )
     return wall, cpu, modes
 
 

@@ -92,8 +92,14 @@ def group_modes(
     Raises
     ------
     ValueError
-        If the method is unknown, the periods fall, or no mode reaches the threshold.
+        If the modes are not rows, the rate is not positive, the method unknown, the periods fall, or no mode reaches the threshold.
     """
+    if modes.ndim != 2 or modes.shape[0] == 0:
+        msg = f"modes: expected two axes, a mode per row and the residual last, got shape {modes.shape}"
+        raise ValueError(msg)
+    if not sample_rate_hz > 0.0:
+        msg = f"sample_rate_hz: expected above 0 Hz, got {sample_rate_hz}"
+        raise ValueError(msg)
     rows = range(modes.shape[0])
     n_mode = len(rows) - 1
     if method == "period":
