@@ -66,6 +66,14 @@ def test_permutation_entropy_of_a_mode_is_a_gauge_of_its_period():
     assert off[1:].max() < 0.01
 
 
+def test_groups_by_sample_entropy_are_cut_at_the_first_and_last_irregular_mode():
+    """White noise held for a block keeps its size when averaged (-ln erf(0.1) = 2.2); what is faster averages out, what is slower repeats."""
+    held = np.repeat(np.random.default_rng(4).standard_normal((2, 1500)), 55, axis=1)
+    fast, slow, residual = tones([3.0, 50_000.0], held.shape[1])
+    groups = group_modes(np.array([fast, *held, slow, residual]), 1.0, method="sample_entropy", scale=55)
+    assert (groups.noise, groups.mixed, groups.drift) == (range(1), range(1, 3), range(3, 5))
+
+
 def gyro_record(seed):
     """Return a day at 1 Hz: white and flicker noise that cross within a minute, and a slow drift four times as large [rad/s]."""
     n = 85_200
