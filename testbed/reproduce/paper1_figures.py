@@ -1,0 +1,302 @@
+"""The figures of paper 1, drawn at the width of a journal's column from the tables of `paper1_data`."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from testbed.fusion.arw_shakf import ArwShakfParameters
+from testbed.palette import COMMANDED, TRUTH, series_colors
+from testbed.report.numbers import decade, plain
+from testbed.report.svg import INK, STYLE
+from testbed.reproduce.paper1_data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
+from testbed.reproduce.paper1_runs import DEG, FILTERS, SENSORS
+from testbed.store import write_bytes, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from testbed.reproduce.paper1_data import Table
+    from testbed.reproduce.paper1_runs import Protocol
+    from testbed.signals import FloatArray
+
+COLUMN_IN = 3.5
+PRINT = {**STYLE, "font.size": 7.5, "axes.labelsize": 7.5, "axes.titlesize": 7.5, "legend.fontsize": 6.8}
+COLORS = series_colors(tuple(SENSORS), FILTERS)
+LABELS = {
+    "mems_gyro": "MEMS gyro",
+    "mhd_ars": "MHD ARS",
+    "shakf": "SHAKF",
+    "arw_shakf": "ARW-SHAKF",
+    "arw_shakf_literal": "ARW-SHAKF as printed",
+}
+# Beside the color, so that lines can be told apart without it.
+DASHES = {"shakf": (0, (4, 1.2)), "arw_shakf": (0, None), "arw_shakf_literal": (0, (1.2, 1))}
+# Which signal each figure of a run shows, and which of its tables.
+RUNS = {
+    "figure_8": ("0.5 Hz", "rates"),
+    "figure_9": ("4 Hz", "rates"),
+    "figure_10": ("10 Hz", "rates"),
+    "figure_11": ("4 Hz", "fused"),
+    "figure_12": ("4 Hz", "adaptation"),
+    "figure_13": ("mixed", "rates"),
+    "figure_14": ("mixed", "fused"),
+    "figure_15": ("mixed", "adaptation"),
+}
+
+
+def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: Protocol) -> Iterator[str]:
+    """Write every figure as SVG and PNG beside the tables that it shows, and yield a line for each.
+
+    Parameters
+    ----------
+    rates : mapping of str to ndarray, shape (n_time,)
+        True rate of each signal [rad/s].
+    out : Path
+        Folder to write to.
+    protocol : Protocol
+        Times of a run.
+
+    Yields
+    ------
+    str
+        One line.
+    """
+    yield ""
+    yield f"figures (SVG and PNG, the numbers in CSV) in {out}"
+    points = stepped_sine()
+    for name, tables, draw in (
+        ("figure_2", slip_error(), draw_slip_error),
+        ("figure_6", bode(points), draw_bode),
+        ("figure_7", increments(points), draw_increments),
+    ):
+        yield _write(out, name, tables, draw(*tables.values()))
+    runs: dict[str, dict[str, Table]] = {}
+    for name, (signal, kind) in RUNS.items():
+        if signal not in runs:
+            runs[signal] = following(rates[signal], signal, protocol)
+        table = runs[signal][kind]
+        yield _write(out, name, {name: table}, DRAW[kind](table))
+
+
+def draw_slip_error(table: Table) -> Figure:
+    """Draw figure 2; argument as from `slip_error`."""
+    figure, (axes,) = _panels(2.4)
+    handles = []
+    channels = {"0p036t": "0.036 T, 10 mm", "0p1t": "0.1 T, 10 mm", "sx300": "0.448 T, 15 mm (sx300)"}
+    for (name, label), color in zip(channels.items(), ("#2f86d6", TRUTH, "#b565d8"), strict=True):
+        handles += axes.plot(table["frequency_hz"], table[f"full_{name}"], color=color, linewidth=1.3, label=label)
+        axes.plot(table["frequency_hz"], table[f"one_mode_{name}"], color=color, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    handles += [_key("full equation (2)", linewidth=1.3), _key("one mode (6)", linestyle=(0, (3, 1.5)))]
+    axes.set_ylim(1e-4, 1.6)
+    _logarithmic(axes, "xy")
+    axes.set_ylabel("error of the reading $e_M$ [-]")
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_xlim(1e-3, 1e3)
+    axes.legend(handles=handles, loc="lower left")
+    return figure
+
+
+def draw_bode(curves: Table, measured: Table) -> Figure:
+    """Draw figure 6; arguments as from `bode`."""
+    figure, (gain, phase) = _panels(3.4, 2)
+    handles = []
+    for name in SENSORS:
+        for axes, what in ((gain, "gain"), (phase, "phase_deg")):
+            scale = _decibel if what == "gain" else _same
+            line = axes.plot(curves["frequency_hz"], scale(curves[f"{name}_{what}"]), color=COLORS[f"sensors/{name}"])
+            axes.plot(
+                curves["frequency_hz"], scale(curves[f"{name}_eq39_{what}"]), color=INK, linewidth=0.9, linestyle=":"
+            )
+            axes.plot(
+                measured["frequency_hz"],
+                scale(measured[f"{name}_{what}"]),
+                **MARKER,
+                markeredgecolor=COLORS[f"sensors/{name}"],
+            )
+        line[0].set_label(LABELS[name])
+        handles += line
+    handles += [
+        _key("equation (39)", linewidth=0.9, linestyle=":"),
+        Line2D([], [], **MARKER, markeredgecolor=INK, label="stepped sine"),
+    ]
+    gain.set_ylabel("gain [dB]")
+    phase.set_ylabel("phase [deg]")
+    phase.set_yticks([-90, -45, 0, 45, 90])
+    phase.set_xlabel("frequency [Hz]")
+    _logarithmic(gain, "x")
+    phase.set_xlim(0.05, 1e3)
+    _legend(figure, handles, 2)
+    return figure
+
+
+def draw_increments(curves: Table, measured: Table) -> Figure:
+    """Draw figure 7 with the band limits of `arw_shakf`; arguments as from `increments`."""
+    figure, panels = _panels(3.6, 2)
+    for axes, name in zip(panels, SENSORS, strict=True):
+        color, column = COLORS[f"sensors/{name}"], f"{name}_deg2_s2"
+        axes.plot(curves["frequency_hz"], curves[column], color=color, label="formula")
+        axes.plot(measured["frequency_hz"], measured[column], **MARKER, markeredgecolor=color, label="stepped sine")
+        _logarithmic(axes, "xy")
+        bottom, top = 0.6 * curves[column].min(), 2.2 * curves[column].max()
+        axes.set_ylim(bottom, top)
+        edges = _band_limits(name)
+        for edge in edges:
+            axes.axhline(edge, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
+        for band, low, high in zip(("low", "mid", "high"), (bottom, *edges), (*edges, top), strict=True):
+            axes.text(0.985, np.sqrt(low * high), band, transform=axes.get_yaxis_transform(), ha="right", va="center")
+        axes.set_title(f"{LABELS[name]} at 1 deg/s", loc="left")
+        axes.set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
+    panels[-1].set_xlabel("frequency [Hz]")
+    panels[-1].set_xlim(0.1, 36.0)
+    panels[0].legend(loc="upper left")
+    return figure
+
+
+def draw_rates(table: Table) -> Figure:
+    """Draw figure 8, 9, 10 or 13; argument as the table `rates` of `following`."""
+    figure, (axes,) = _panels(2.3)
+    t = table["time_s"]
+    handles = axes.plot(t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable")
+    for name, dashes in (("mems_gyro", (0, (5, 1.3))), ("mhd_ars", (0, (2.2, 1)))):
+        handles += axes.plot(
+            t, table[f"{name}_deg_s"], color=COLORS[f"sensors/{name}"], linestyle=dashes, label=LABELS[name]
+        )
+    handles += axes.plot(
+        t, table["arw_shakf_deg_s"], color=COLORS["fusion/arw_shakf"], linewidth=0.9, label="fused (ARW-SHAKF)"
+    )
+    _in_time(axes, t)
+    axes.set_ylabel("rate [deg/s]")
+    _legend(figure, handles, 2)
+    return figure
+
+
+def draw_fused(table: Table) -> Figure:
+    """Draw figure 11 or 14; argument as the table `fused` of `following`. The errors have scales of their own."""
+    figure, panels = _panels(4.2, 3)
+    t = table["time_s"]
+    handles = panels[0].plot(
+        t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable"
+    )
+    for name in FOLLOWERS:
+        handles += panels[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
+        milli = 1e3 * table[f"{name}_error_deg_s"]
+        panels[1 if name == "shakf" else 2].plot(t, milli, **_style(name))
+    panels[0].set_ylabel("rate [deg/s]")
+    for axes, label in zip(panels, ("fused rates", "error of SHAKF", "errors of the ARW forms"), strict=True):
+        axes.set_title(label, loc="left")
+    for axes in panels[1:]:
+        axes.set_ylabel("error [10$^{-3}$ deg/s]")
+    _in_time(panels[-1], t)
+    _legend(figure, handles, 2)
+    return figure
+
+
+def draw_adaptation(table: Table) -> Figure:
+    """Draw figure 12 or 15; argument as the table `adaptation` of `following`."""
+    figure, panels = _panels(4.8, 3)
+    handles = []
+    for axes, (sensor, index) in zip(panels, (("mems_gyro", 11), ("mhd_ars", 22)), strict=False):
+        handles = [
+            axes.plot(table["time_s"], table[f"{name}_R_{sensor}_deg2_s2"], label=LABELS[name], **_style(name))[0]
+            for name in FOLLOWERS
+        ]
+        axes.set_title(f"$R_{{{index}}}$, {LABELS[sensor]}", loc="left")
+        axes.set_ylabel("$R$ [(deg/s)$^2$]")
+    for sensor in SENSORS:
+        for name in FOLLOWERS[1:]:
+            style = _style(name) | {"color": COLORS[f"sensors/{sensor}"]}
+            panels[2].plot(table["time_s"], table[f"{name}_N_{sensor}_deg2_s2"], **style)
+        last = table[f"arw_shakf_N_{sensor}_deg2_s2"][-1]
+        panels[2].annotate(
+            LABELS[sensor], (table["time_s"][-1], last), (-2, 3), textcoords="offset points", ha="right", va="bottom"
+        )
+    panels[2].set_title("$N_k$ of both sensors: solid with fading memory, dotted as printed", loc="left")
+    panels[2].set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
+    panels[2].set_xlabel("time [s]")
+    for axes in panels:
+        _logarithmic(axes, "xy")
+    panels[2].set_xlim(table["time_s"][0], table["time_s"][-1])
+    _legend(figure, handles, 3)
+    return figure
+
+
+DRAW: dict[str, Callable[[Table], Figure]] = {
+    "rates": draw_rates,
+    "fused": draw_fused,
+    "adaptation": draw_adaptation,
+}
+MARKER = {"marker": "o", "linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9}
+
+
+def _panels(height_in: float, n: int = 1) -> tuple[Figure, list[Axes]]:
+    with mpl.rc_context(PRINT):
+        figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
+        panels = list(figure.subplots(n, 1, sharex=True, squeeze=False)[:, 0])
+        for axes in panels:
+            axes.grid(visible=True)
+    return figure, panels
+
+
+def _style(name: str) -> dict[str, Any]:
+    return {"color": COLORS[f"fusion/{name}"], "linestyle": DASHES[name], "linewidth": 1.0}
+
+
+def _key(label: str, **style: Any) -> Line2D:
+    return Line2D([], [], color=INK, label=label, **style)
+
+
+def _legend(figure: Figure, handles: list[Line2D], columns: int) -> None:
+    """Put the legend above the panels, where it hides nothing."""
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def _logarithmic(axes: Axes, which: str) -> None:
+    for key, axis, scale in (("x", axes.xaxis, axes.set_xscale), ("y", axes.yaxis, axes.set_yscale)):
+        if key in which:
+            scale("log")
+            axis.set_major_locator(LogLocator(numticks=9))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def _in_time(axes: Axes, t: FloatArray) -> None:
+    axes.set_xlabel("time [s]")
+    axes.set_xlim(t[0], t[-1])
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+
+
+def _band_limits(sensor: str) -> tuple[float, float]:
+    """Return the thresholds of N_k / dT that `arw_shakf` has by default [(deg/s)^2]."""
+    low, high = ArwShakfParameters().bands[sensor].thresholds
+    return low / DEG**2, high / DEG**2
+
+
+def _decibel(gain: FloatArray) -> FloatArray:
+    value: FloatArray = 20.0 * np.log10(gain)
+    return value
+
+
+def _same(value: FloatArray) -> FloatArray:
+    return value
+
+
+def _write(out: Path, name: str, tables: Mapping[str, Table], figure: Figure) -> str:
+    for table_name, table in tables.items():
+        write_text(out / f"{table_name}.csv", csv_text(table))
+    # No date and fixed ids: equal numbers give equal files.
+    with mpl.rc_context({**PRINT, "svg.hashsalt": name}):
+        for kind, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 300})):
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=kind, **options)
+            write_bytes(out / f"{name}.{kind}", buffer.getvalue())
+    return f"{name}: {', '.join(f'{table_name}.csv' for table_name in tables)}, {name}.svg, {name}.png"
