@@ -127,7 +127,7 @@ def _step(sensor: Sensor, freq_hz: float, seed: int) -> tuple[complex, float]:
 
 
 def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) -> dict[str, Table]:
-    """Return the three tables of one signal's run: `rates` and `fused` over two periods, `adaptation` over the whole run.
+    """Return the three tables of one signal's run: `rates` and `fused` over two periods (mixed: one), `adaptation` over the whole run.
 
     rates (figures 8-10, 13): table, fused (`arw_shakf`), gyro and MHD ARS. fused (11, 14): the adaptive filters and their errors. adaptation
     (12, 15): R of each filter, N_k / dT of both sensors, with fading memory (`arw_shakf`) and as printed (`arw_shakf_literal`).
@@ -146,7 +146,8 @@ def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) 
     sensors = presets()
     readings = read(rate, seed, sensors)
     blocks = fuse(readings, sensors)
-    length = 2.0 / min(sine.frequency for sine in SIGNALS[signal])
+    lines = [sine.frequency for sine in SIGNALS[signal]]
+    length = min(2.0 / min(lines), 20.0 / max(lines))
     start = max(0.0, min(protocol.settle, protocol.duration - length))
     shown = np.arange(round(start * BASE_HZ), round(min(start + length, protocol.duration) * BASE_HZ), WINDOW_STRIDE)
     time, true = shown / BASE_HZ, rate[shown] / DEG

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from testbed.fusion.arw_shakf import ArwShakfParameters
 from testbed.palette import COMMANDED, TRUTH, series_colors
@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 COLUMN_IN = 3.5
+SMOOTH_S = 20e-3
 PRINT = {**STYLE, "font.size": 7.5, "axes.labelsize": 7.5, "axes.titlesize": 7.5, "legend.fontsize": 6.8}
-COLORS = series_colors(tuple(SENSORS), FILTERS)
+# In the order of the scenarios, so that a signal has the colour that it has in their reports.
+COLORS = series_colors(("mhd_ars", "mems_gyro"), FILTERS)
 LABELS = {
     "mems_gyro": "MEMS gyro",
     "mhd_ars": "MHD ARS",
@@ -41,6 +43,7 @@ LABELS = {
 }
 # Beside the color, so that lines can be told apart without it.
 DASHES = {"shakf": (0, (4, 1.2)), "arw_shakf": (0, None), "arw_shakf_literal": (0, (1.2, 1))}
+LIMIT = (0, (5, 2))
 # Which signal each figure of a run shows, and which of its tables.
 RUNS = {
     "figure_8": ("0.5 Hz", "rates"),
@@ -88,9 +91,10 @@ def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: Protocol
         yield _write(out, name, {name: table}, DRAW[kind](table))
 
 
+@mpl.rc_context(PRINT)
 def draw_slip_error(table: Table) -> Figure:
     """Draw figure 2; argument as from `slip_error`."""
-    figure, (axes,) = _panels(2.4)
+    figure, (axes,) = _panels(2.8)
     handles = []
     channels = {"0p036t": "0.036 T, 10 mm", "0p1t": "0.1 T, 10 mm", "sx300": "0.448 T, 15 mm (sx300)"}
     for (name, label), color in zip(channels.items(), ("#2f86d6", TRUTH, "#b565d8"), strict=True):
@@ -102,10 +106,11 @@ def draw_slip_error(table: Table) -> Figure:
     axes.set_ylabel("error of the reading $e_M$ [-]")
     axes.set_xlabel("frequency [Hz]")
     axes.set_xlim(1e-3, 1e3)
-    axes.legend(handles=handles, loc="lower left")
+    _legend(figure, handles, 2)
     return figure
 
 
+@mpl.rc_context(PRINT)
 def draw_bode(curves: Table, measured: Table) -> Figure:
     """Draw figure 6; arguments as from `bode`."""
     figure, (gain, phase) = _panels(3.4, 2)
@@ -139,29 +144,33 @@ def draw_bode(curves: Table, measured: Table) -> Figure:
     return figure
 
 
+@mpl.rc_context(PRINT)
 def draw_increments(curves: Table, measured: Table) -> Figure:
     """Draw figure 7 with the band limits of `arw_shakf`; arguments as from `increments`."""
     figure, panels = _panels(3.6, 2)
+    handles = [_key("formula"), Line2D([], [], **MARKER, markeredgecolor=INK, label="stepped sine")]
+    handles += [_key("band limits", linewidth=0.8, linestyle=LIMIT)]
     for axes, name in zip(panels, SENSORS, strict=True):
         color, column = COLORS[f"sensors/{name}"], f"{name}_deg2_s2"
-        axes.plot(curves["frequency_hz"], curves[column], color=color, label="formula")
-        axes.plot(measured["frequency_hz"], measured[column], **MARKER, markeredgecolor=color, label="stepped sine")
+        axes.plot(curves["frequency_hz"], curves[column], color=color)
+        axes.plot(measured["frequency_hz"], measured[column], **MARKER, markeredgecolor=color)
         _logarithmic(axes, "xy")
         bottom, top = 0.6 * curves[column].min(), 2.2 * curves[column].max()
         axes.set_ylim(bottom, top)
         edges = _band_limits(name)
         for edge in edges:
-            axes.axhline(edge, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
+            axes.axhline(edge, color=INK, linewidth=0.8, linestyle=LIMIT)
         for band, low, high in zip(("low", "mid", "high"), (bottom, *edges), (*edges, top), strict=True):
             axes.text(0.985, np.sqrt(low * high), band, transform=axes.get_yaxis_transform(), ha="right", va="center")
-        axes.set_title(f"{LABELS[name]} at 1 deg/s", loc="left")
+        axes.set_title(f"{LABELS[name]}, sine of 1 deg/s", loc="left")
         axes.set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
     panels[-1].set_xlabel("frequency [Hz]")
-    panels[-1].set_xlim(0.1, 36.0)
-    panels[0].legend(loc="upper left")
+    panels[-1].set_xlim(0.09, 60.0)
+    _legend(figure, handles, 3)
     return figure
 
 
+@mpl.rc_context(PRINT)
 def draw_rates(table: Table) -> Figure:
     """Draw figure 8, 9, 10 or 13; argument as the table `rates` of `following`."""
     figure, (axes,) = _panels(2.3)
@@ -180,27 +189,27 @@ def draw_rates(table: Table) -> Figure:
     return figure
 
 
+@mpl.rc_context(PRINT)
 def draw_fused(table: Table) -> Figure:
     """Draw figure 11 or 14; argument as the table `fused` of `following`. The errors have scales of their own."""
-    figure, panels = _panels(4.2, 3)
+    figure, panels = _panels(4.9, 1 + len(FOLLOWERS))
     t = table["time_s"]
-    handles = panels[0].plot(
-        t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable"
-    )
-    for name in FOLLOWERS:
-        handles += panels[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
-        milli = 1e3 * table[f"{name}_error_deg_s"]
-        panels[1 if name == "shakf" else 2].plot(t, milli, **_style(name))
+    handles = panels[0].plot(t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable")
     panels[0].set_ylabel("rate [deg/s]")
-    for axes, label in zip(panels, ("fused rates", "error of SHAKF", "errors of the ARW forms"), strict=True):
-        axes.set_title(label, loc="left")
-    for axes in panels[1:]:
-        axes.set_ylabel("error [10$^{-3}$ deg/s]")
+    for axes, name in zip(panels[1:], FOLLOWERS, strict=True):
+        handles += panels[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
+        milli, color = 1e3 * table[f"{name}_error_deg_s"], COLORS[f"fusion/{name}"]
+        axes.plot(t, milli, color=color, linewidth=0.4, alpha=0.4)
+        axes.plot(t, _smooth(milli, t), color=color, linewidth=1.2)
+        axes.set_title(f"error of {LABELS[name]}", loc="left")
+        axes.set_ylabel("[10$^{-3}$ deg/s]")
+    panels[1].set_title("error of SHAKF (bold: mean over 20 ms)", loc="left")
     _in_time(panels[-1], t)
     _legend(figure, handles, 2)
     return figure
 
 
+@mpl.rc_context(PRINT)
 def draw_adaptation(table: Table) -> Figure:
     """Draw figure 12 or 15; argument as the table `adaptation` of `following`."""
     figure, panels = _panels(4.8, 3)
@@ -213,20 +222,18 @@ def draw_adaptation(table: Table) -> Figure:
         axes.set_title(f"$R_{{{index}}}$, {LABELS[sensor]}", loc="left")
         axes.set_ylabel("$R$ [(deg/s)$^2$]")
     for sensor in SENSORS:
-        for name in FOLLOWERS[1:]:
-            style = _style(name) | {"color": COLORS[f"sensors/{sensor}"]}
-            panels[2].plot(table["time_s"], table[f"{name}_N_{sensor}_deg2_s2"], **style)
-        last = table[f"arw_shakf_N_{sensor}_deg2_s2"][-1]
-        panels[2].annotate(
-            LABELS[sensor], (table["time_s"][-1], last), (-2, 3), textcoords="offset points", ha="right", va="bottom"
-        )
-    panels[2].set_title("$N_k$ of both sensors: solid with fading memory, dotted as printed", loc="left")
+        fading, printed = (table[f"{name}_N_{sensor}_deg2_s2"] for name in FOLLOWERS[1:])
+        panels[2].plot(table["time_s"], fading, color=COLORS[f"sensors/{sensor}"])
+        panels[2].plot(table["time_s"], printed, color=INK, linewidth=0.9, linestyle=(0, (1.2, 1)))
+        place = {"xytext": (-2, -6), "textcoords": "offset points", "ha": "right", "va": "top"}
+        panels[2].annotate(LABELS[sensor], (table["time_s"][-1], fading[-1]), **place)
+    panels[2].set_title("$N_k$ (solid: fading memory, dotted: as printed)", loc="left")
     panels[2].set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
     panels[2].set_xlabel("time [s]")
     for axes in panels:
         _logarithmic(axes, "xy")
     panels[2].set_xlim(table["time_s"][0], table["time_s"][-1])
-    _legend(figure, handles, 3)
+    _legend(figure, handles, 2)
     return figure
 
 
@@ -239,11 +246,10 @@ MARKER = {"marker": "o", "linestyle": "none", "markersize": 3.6, "markerfacecolo
 
 
 def _panels(height_in: float, n: int = 1) -> tuple[Figure, list[Axes]]:
-    with mpl.rc_context(PRINT):
-        figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
-        panels = list(figure.subplots(n, 1, sharex=True, squeeze=False)[:, 0])
-        for axes in panels:
-            axes.grid(visible=True)
+    figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
+    panels = list(figure.subplots(n, 1, sharex=True, squeeze=False)[:, 0])
+    for axes in panels:
+        axes.grid(visible=True)
     return figure, panels
 
 
@@ -272,7 +278,16 @@ def _logarithmic(axes: Axes, which: str) -> None:
 def _in_time(axes: Axes, t: FloatArray) -> None:
     axes.set_xlabel("time [s]")
     axes.set_xlim(t[0], t[-1])
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+
+
+def _smooth(values: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the running mean over `SMOOTH_S`, NaN where it would reach beyond the ends."""
+    n = 2 * round(0.5 * SMOOTH_S / (t[1] - t[0])) + 1
+    mean = np.full_like(values, np.nan)
+    mean[n // 2 : values.size - n // 2] = np.convolve(values, np.full(n, 1.0 / n), mode="valid")
+    return mean
 
 
 def _band_limits(sensor: str) -> tuple[float, float]:
