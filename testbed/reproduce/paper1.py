@@ -91,9 +91,7 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
     yield f"Table II: RMSE in deg/s, phase included; median over {seeds} seed(s)"
     yield f"{'':8s}{'':20s}{'median':>10s}{'lowest':>10s}{'highest':>10s}{'aligned':>10s}{'paper':>10s}"
     for signal, rate in rates.items():
-        runs = [
-            errors(outputs(rate, seed, sensors), rate, signal, protocol) for seed in range(1, seeds + 1)
-        ]
+        runs = [errors(outputs(rate, seed, sensors), rate, signal, protocol) for seed in range(1, seeds + 1)]
         for name in runs[0]:
             rows.append((signal, name, *_statistics([run[name] for run in runs]), PAPER[signal].get(name)))
             yield f"{signal:8s}{name:20s}" + "".join(f"{_text(value, 4):>10s}" for value in rows[-1][2:])

@@ -161,11 +161,9 @@ def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) 
     picked = WINDOW_STRIDE * np.unique(np.round(np.geomspace(1, rate.size // WINDOW_STRIDE - 1, 600)).astype(int))
     adaptation = {"time_s": picked / BASE_HZ}
     for name in FOLLOWERS:
-        for what in ("R", "N"):
-            for sensor in sensors:
-                values = blocks[name].diagnostics.get(f"{what}_{sensor}")
-                if values is not None:
-                    adaptation[f"{name}_{what}_{sensor}_deg2_s2"] = values[picked] / DEG**2
+        known = blocks[name].diagnostics
+        shown_here = [f"{what}_{sensor}" for what in "RN" for sensor in sensors if f"{what}_{sensor}" in known]
+        adaptation |= {f"{name}_{key}_deg2_s2": known[key][picked] / DEG**2 for key in shown_here}
     return {"rates": rates, "fused": fused, "adaptation": adaptation}
 
 
@@ -183,4 +181,4 @@ def csv_text(table: Table) -> str:
 
 
 def _gain_and_phase(name: str, response: ComplexArray) -> Table:
-    return {f"{name}_gain": np.abs(response), f"{name}_phase_deg": np.angle(response, deg=True)}
+    return {f"{name}_gain_db": 20.0 * np.log10(np.abs(response)), f"{name}_phase_deg": np.angle(response, deg=True)}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.reproduce.paper1_runs import FILTERS, SIGNALS, Protocol, errors, outputs, presets
+from testbed.reproduce.paper1_runs import FILTERS, Protocol, errors, outputs, presets
 from testbed.store import write_text
 
 if TYPE_CHECKING:
@@ -141,7 +141,10 @@ def split(rate: FloatArray, signal: str, case: str, seeds: int, protocol: Protoc
         noises.append({name: _rms_deg(noisy[name] - quiet[name], rate.size, protocol) for name in FILTERS})
     return {
         name: Split(
-            *np.array([total[name] for total in totals]).T, np.array([noise[name] for noise in noises]), belief[name][0]
+            rmse=np.array([total[name][0] for total in totals]),
+            aligned=np.array([total[name][1] for total in totals]),
+            noise=np.array([noise[name] for noise in noises]),
+            belief=belief[name][0],
         )
         for name in FILTERS
     }
@@ -166,19 +169,20 @@ def table_ii_defects(rates: Mapping[str, FloatArray], seeds: int, out: Path, pro
     str
         One line.
     """
-    rows = []
+    lines = [f"case,signal,name,{','.join(COLUMNS)}"]
     yield ""
-    yield f"Table II with defects: RMSE = (belief error, noise error) in 1e-3 deg/s, median over {seeds} seed(s)"
+    yield f"Table II with defects: RMSE (belief error, noise error) in 1e-3 deg/s, median over {seeds} seed(s)"
     yield f"{'':32s}" + "".join(f"{name:>22s}" for name in FILTERS)
-    for signal in SIGNALS:
+    for signal, rate in rates.items():
         clean: dict[str, Split] = {}
         for case in CASES:
-            found = split(rates[signal], signal, case, seeds, protocol)
+            found = split(rate, signal, case, seeds, protocol)
             clean = clean or found
-            rows += [(case, signal, name, *found[name].row(clean[name])) for name in FILTERS]
+            for name in FILTERS:
+                values = ",".join(f"{value:.9f}" for value in found[name].row(clean[name]))
+                lines.append(f"{case},{signal},{name},{values}")
             yield f"{signal:8s}{case:24s}" + "".join(f"{_cell(found[name]):>22s}" for name in FILTERS)
-    lines = [",".join((*row[:3], *(f"{value:.9f}" for value in row[3:]))) for row in rows]
-    write_text(out / "table_ii_defects.csv", "\n".join([f"case,signal,name,{','.join(COLUMNS)}", *lines]) + "\n")
+    write_text(out / "table_ii_defects.csv", "\n".join(lines) + "\n")
 
 
 def _cell(found: Split) -> str:

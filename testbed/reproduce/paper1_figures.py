@@ -2,38 +2,44 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from testbed import palette
 from testbed.fusion.arw_shakf import ArwShakfParameters
-from testbed.palette import COMMANDED, TRUTH, series_colors
-from testbed.report.numbers import decade, plain
-from testbed.report.svg import INK, STYLE
+from testbed.report.svg import INK
+from testbed.reproduce.drawing import (
+    DOTTED,
+    LIMIT,
+    MARKER,
+    PRINT,
+    in_time,
+    key,
+    legend,
+    logarithmic,
+    panels,
+    save,
+    smooth,
+)
 from testbed.reproduce.paper1_data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
 from testbed.reproduce.paper1_runs import DEG, FILTERS, SENSORS
-from testbed.store import write_bytes, write_text
+from testbed.store import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
-    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from testbed.reproduce.paper1_data import Table
     from testbed.reproduce.paper1_runs import Protocol
     from testbed.signals import FloatArray
 
-COLUMN_IN = 3.5
 SMOOTH_S = 20e-3
-PRINT = {**STYLE, "font.size": 7.5, "axes.labelsize": 7.5, "axes.titlesize": 7.5, "legend.fontsize": 6.8}
-# In the order of the scenarios, so that a signal has the colour that it has in their reports.
-COLORS = series_colors(("mhd_ars", "mems_gyro"), FILTERS)
+# In the order of the scenarios, so that a signal has the color that it has in their reports.
+COLORS = palette.series_colors(("mhd_ars", "mems_gyro"), FILTERS)
 LABELS = {
     "mems_gyro": "MEMS gyro",
     "mhd_ars": "MHD ARS",
@@ -42,8 +48,7 @@ LABELS = {
     "arw_shakf_literal": "ARW-SHAKF as printed",
 }
 # Beside the color, so that lines can be told apart without it.
-DASHES = {"shakf": (0, (4, 1.2)), "arw_shakf": (0, None), "arw_shakf_literal": (0, (1.2, 1))}
-LIMIT = (0, (5, 2))
+DASHES: dict[str, Any] = {"shakf": (0, (4, 1.2)), "arw_shakf": (0, None), "arw_shakf_literal": DOTTED}
 # Which signal each figure of a run shows, and which of its tables.
 RUNS = {
     "figure_8": ("0.5 Hz", "rates"),
@@ -94,67 +99,61 @@ def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: Protocol
 @mpl.rc_context(PRINT)
 def draw_slip_error(table: Table) -> Figure:
     """Draw figure 2; argument as from `slip_error`."""
-    figure, (axes,) = _panels(2.8)
+    figure, (axes,) = panels(2.8)
     handles = []
     channels = {"0p036t": "0.036 T, 10 mm", "0p1t": "0.1 T, 10 mm", "sx300": "0.448 T, 15 mm (sx300)"}
-    for (name, label), color in zip(channels.items(), ("#2f86d6", TRUTH, "#b565d8"), strict=True):
+    for (name, label), color in zip(
+        channels.items(), (palette.SENSORS[0], palette.TRUTH, palette.FILTERS[1]), strict=True
+    ):
         handles += axes.plot(table["frequency_hz"], table[f"full_{name}"], color=color, linewidth=1.3, label=label)
         axes.plot(table["frequency_hz"], table[f"one_mode_{name}"], color=color, linewidth=1.0, linestyle=(0, (3, 1.5)))
-    handles += [_key("full equation (2)", linewidth=1.3), _key("one mode (6)", linestyle=(0, (3, 1.5)))]
+    handles += [key("full equation (2)", linewidth=1.3), key("one mode (6)", linestyle=(0, (3, 1.5)))]
     axes.set_ylim(1e-4, 1.6)
-    _logarithmic(axes, "xy")
+    logarithmic(axes, "xy")
     axes.set_ylabel("error of the reading $e_M$ [-]")
     axes.set_xlabel("frequency [Hz]")
     axes.set_xlim(1e-3, 1e3)
-    _legend(figure, handles, 2)
+    legend(figure, handles, 2)
     return figure
 
 
 @mpl.rc_context(PRINT)
 def draw_bode(curves: Table, measured: Table) -> Figure:
     """Draw figure 6; arguments as from `bode`."""
-    figure, (gain, phase) = _panels(3.4, 2)
-    handles = []
+    figure, (gain, phase) = panels(3.4, 2)
+    freq, handles = curves["frequency_hz"], []
     for name in SENSORS:
-        for axes, what in ((gain, "gain"), (phase, "phase_deg")):
-            scale = _decibel if what == "gain" else _same
-            line = axes.plot(curves["frequency_hz"], scale(curves[f"{name}_{what}"]), color=COLORS[f"sensors/{name}"])
-            axes.plot(
-                curves["frequency_hz"], scale(curves[f"{name}_eq39_{what}"]), color=INK, linewidth=0.9, linestyle=":"
-            )
-            axes.plot(
-                measured["frequency_hz"],
-                scale(measured[f"{name}_{what}"]),
-                **MARKER,
-                markeredgecolor=COLORS[f"sensors/{name}"],
-            )
-        line[0].set_label(LABELS[name])
-        handles += line
+        color = COLORS[f"sensors/{name}"]
+        for axes, what in ((gain, "gain_db"), (phase, "phase_deg")):
+            axes.plot(freq, curves[f"{name}_{what}"], color=color)
+            axes.plot(freq, curves[f"{name}_eq39_{what}"], color=INK, linewidth=0.9, linestyle=":")
+            axes.plot(measured["frequency_hz"], measured[f"{name}_{what}"], **MARKER, markeredgecolor=color)
+        handles.append(key(LABELS[name], color=color))
     handles += [
-        _key("equation (39)", linewidth=0.9, linestyle=":"),
-        Line2D([], [], **MARKER, markeredgecolor=INK, label="stepped sine"),
+        key("equation (39)", linewidth=0.9, linestyle=":"),
+        key("stepped sine", **MARKER, markeredgecolor=INK),
     ]
     gain.set_ylabel("gain [dB]")
     phase.set_ylabel("phase [deg]")
     phase.set_yticks([-90, -45, 0, 45, 90])
     phase.set_xlabel("frequency [Hz]")
-    _logarithmic(gain, "x")
+    logarithmic(gain, "x")
     phase.set_xlim(0.05, 1e3)
-    _legend(figure, handles, 2)
+    legend(figure, handles, 2)
     return figure
 
 
 @mpl.rc_context(PRINT)
 def draw_increments(curves: Table, measured: Table) -> Figure:
     """Draw figure 7 with the band limits of `arw_shakf`; arguments as from `increments`."""
-    figure, panels = _panels(3.6, 2)
-    handles = [_key("formula"), Line2D([], [], **MARKER, markeredgecolor=INK, label="stepped sine")]
-    handles += [_key("band limits", linewidth=0.8, linestyle=LIMIT)]
-    for axes, name in zip(panels, SENSORS, strict=True):
+    figure, rows = panels(3.6, 2)
+    handles = [key("formula"), key("stepped sine", **MARKER, markeredgecolor=INK)]
+    handles += [key("band limits", linewidth=0.8, linestyle=LIMIT)]
+    for axes, name in zip(rows, SENSORS, strict=True):
         color, column = COLORS[f"sensors/{name}"], f"{name}_deg2_s2"
         axes.plot(curves["frequency_hz"], curves[column], color=color)
         axes.plot(measured["frequency_hz"], measured[column], **MARKER, markeredgecolor=color)
-        _logarithmic(axes, "xy")
+        logarithmic(axes, "xy")
         bottom, top = 0.6 * curves[column].min(), 2.2 * curves[column].max()
         axes.set_ylim(bottom, top)
         edges = _band_limits(name)
@@ -164,18 +163,20 @@ def draw_increments(curves: Table, measured: Table) -> Figure:
             axes.text(0.985, np.sqrt(low * high), band, transform=axes.get_yaxis_transform(), ha="right", va="center")
         axes.set_title(f"{LABELS[name]}, sine of 1 deg/s", loc="left")
         axes.set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
-    panels[-1].set_xlabel("frequency [Hz]")
-    panels[-1].set_xlim(0.09, 60.0)
-    _legend(figure, handles, 3)
+    rows[-1].set_xlabel("frequency [Hz]")
+    rows[-1].set_xlim(0.09, 60.0)
+    legend(figure, handles, 3)
     return figure
 
 
 @mpl.rc_context(PRINT)
 def draw_rates(table: Table) -> Figure:
     """Draw figure 8, 9, 10 or 13; argument as the table `rates` of `following`."""
-    figure, (axes,) = _panels(2.3)
+    figure, (axes,) = panels(2.3)
     t = table["time_s"]
-    handles = axes.plot(t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable")
+    handles = axes.plot(
+        t, table["turntable_deg_s"], color=palette.COMMANDED, linewidth=3.4, alpha=0.6, label="turntable"
+    )
     for name, dashes in (("mems_gyro", (0, (5, 1.3))), ("mhd_ars", (0, (2.2, 1)))):
         handles += axes.plot(
             t, table[f"{name}_deg_s"], color=COLORS[f"sensors/{name}"], linestyle=dashes, label=LABELS[name]
@@ -183,38 +184,40 @@ def draw_rates(table: Table) -> Figure:
     handles += axes.plot(
         t, table["arw_shakf_deg_s"], color=COLORS["fusion/arw_shakf"], linewidth=0.9, label="fused (ARW-SHAKF)"
     )
-    _in_time(axes, t)
+    in_time(axes, t)
     axes.set_ylabel("rate [deg/s]")
-    _legend(figure, handles, 2)
+    legend(figure, handles, 2)
     return figure
 
 
 @mpl.rc_context(PRINT)
 def draw_fused(table: Table) -> Figure:
     """Draw figure 11 or 14; argument as the table `fused` of `following`. The errors have scales of their own."""
-    figure, panels = _panels(4.9, 1 + len(FOLLOWERS))
+    figure, rows = panels(4.9, 1 + len(FOLLOWERS))
     t = table["time_s"]
-    handles = panels[0].plot(t, table["turntable_deg_s"], color=COMMANDED, linewidth=3.4, alpha=0.6, label="turntable")
-    panels[0].set_ylabel("rate [deg/s]")
-    for axes, name in zip(panels[1:], FOLLOWERS, strict=True):
-        handles += panels[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
+    handles = rows[0].plot(
+        t, table["turntable_deg_s"], color=palette.COMMANDED, linewidth=3.4, alpha=0.6, label="turntable"
+    )
+    rows[0].set_ylabel("rate [deg/s]")
+    for axes, name in zip(rows[1:], FOLLOWERS, strict=True):
+        handles += rows[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
         milli, color = 1e3 * table[f"{name}_error_deg_s"], COLORS[f"fusion/{name}"]
         axes.plot(t, milli, color=color, linewidth=0.4, alpha=0.4)
-        axes.plot(t, _smooth(milli, t), color=color, linewidth=1.2)
+        axes.plot(t, smooth(milli, t, SMOOTH_S), color=color, linewidth=1.2)
         axes.set_title(f"error of {LABELS[name]}", loc="left")
         axes.set_ylabel("[10$^{-3}$ deg/s]")
-    panels[1].set_title("error of SHAKF (bold: mean over 20 ms)", loc="left")
-    _in_time(panels[-1], t)
-    _legend(figure, handles, 2)
+    rows[1].set_title("error of SHAKF (bold: mean over 20 ms)", loc="left")
+    in_time(rows[-1], t)
+    legend(figure, handles, 2)
     return figure
 
 
 @mpl.rc_context(PRINT)
 def draw_adaptation(table: Table) -> Figure:
     """Draw figure 12 or 15; argument as the table `adaptation` of `following`."""
-    figure, panels = _panels(4.8, 3)
+    figure, rows = panels(4.8, 3)
     handles = []
-    for axes, (sensor, index) in zip(panels, (("mems_gyro", 11), ("mhd_ars", 22)), strict=False):
+    for axes, (sensor, index) in zip(rows, (("mems_gyro", 11), ("mhd_ars", 22)), strict=False):
         handles = [
             axes.plot(table["time_s"], table[f"{name}_R_{sensor}_deg2_s2"], label=LABELS[name], **_style(name))[0]
             for name in FOLLOWERS
@@ -223,17 +226,18 @@ def draw_adaptation(table: Table) -> Figure:
         axes.set_ylabel("$R$ [(deg/s)$^2$]")
     for sensor in SENSORS:
         fading, printed = (table[f"{name}_N_{sensor}_deg2_s2"] for name in FOLLOWERS[1:])
-        panels[2].plot(table["time_s"], fading, color=COLORS[f"sensors/{sensor}"])
-        panels[2].plot(table["time_s"], printed, color=INK, linewidth=0.9, linestyle=(0, (1.2, 1)))
-        place = {"xytext": (-2, -6), "textcoords": "offset points", "ha": "right", "va": "top"}
-        panels[2].annotate(LABELS[sensor], (table["time_s"][-1], fading[-1]), **place)
-    panels[2].set_title("$N_k$ (solid: fading memory, dotted: as printed)", loc="left")
-    panels[2].set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
-    panels[2].set_xlabel("time [s]")
-    for axes in panels:
-        _logarithmic(axes, "xy")
-    panels[2].set_xlim(table["time_s"][0], table["time_s"][-1])
-    _legend(figure, handles, 2)
+        rows[2].plot(table["time_s"], fading, color=COLORS[f"sensors/{sensor}"])
+        rows[2].plot(table["time_s"], printed, color=INK, linewidth=0.9, linestyle=DOTTED)
+        place: dict[str, Any] = {"xytext": (-2, -6), "textcoords": "offset points", "ha": "right", "va": "top"}
+        rows[2].annotate(LABELS[sensor], (table["time_s"][-1], fading[-1]), **place)
+    rows[2].set_title("$N_k$ (solid: fading memory, dotted: as printed)", loc="left")
+    rows[2].set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
+    rows[2].set_ylim(3e-7, 6e-5)  # the same in both figures
+    rows[2].set_xlabel("time [s]")
+    for axes in rows:
+        logarithmic(axes, "xy")
+    rows[2].set_xlim(table["time_s"][0], table["time_s"][-1])
+    legend(figure, handles, 2)
     return figure
 
 
@@ -242,52 +246,6 @@ DRAW: dict[str, Callable[[Table], Figure]] = {
     "fused": draw_fused,
     "adaptation": draw_adaptation,
 }
-MARKER = {"marker": "o", "linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9}
-
-
-def _panels(height_in: float, n: int = 1) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
-    panels = list(figure.subplots(n, 1, sharex=True, squeeze=False)[:, 0])
-    for axes in panels:
-        axes.grid(visible=True)
-    return figure, panels
-
-
-def _style(name: str) -> dict[str, Any]:
-    return {"color": COLORS[f"fusion/{name}"], "linestyle": DASHES[name], "linewidth": 1.0}
-
-
-def _key(label: str, **style: Any) -> Line2D:
-    return Line2D([], [], color=INK, label=label, **style)
-
-
-def _legend(figure: Figure, handles: list[Line2D], columns: int) -> None:
-    """Put the legend above the panels, where it hides nothing."""
-    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
-
-
-def _logarithmic(axes: Axes, which: str) -> None:
-    for key, axis, scale in (("x", axes.xaxis, axes.set_xscale), ("y", axes.yaxis, axes.set_yscale)):
-        if key in which:
-            scale("log")
-            axis.set_major_locator(LogLocator(numticks=9))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
-            axis.set_minor_formatter(NullFormatter())
-
-
-def _in_time(axes: Axes, t: FloatArray) -> None:
-    axes.set_xlabel("time [s]")
-    axes.set_xlim(t[0], t[-1])
-    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-
-
-def _smooth(values: FloatArray, t: FloatArray) -> FloatArray:
-    """Return the running mean over `SMOOTH_S`, NaN where it would reach beyond the ends."""
-    n = 2 * round(0.5 * SMOOTH_S / (t[1] - t[0])) + 1
-    mean = np.full_like(values, np.nan)
-    mean[n // 2 : values.size - n // 2] = np.convolve(values, np.full(n, 1.0 / n), mode="valid")
-    return mean
 
 
 def _band_limits(sensor: str) -> tuple[float, float]:
@@ -296,22 +254,12 @@ def _band_limits(sensor: str) -> tuple[float, float]:
     return low / DEG**2, high / DEG**2
 
 
-def _decibel(gain: FloatArray) -> FloatArray:
-    value: FloatArray = 20.0 * np.log10(gain)
-    return value
-
-
-def _same(value: FloatArray) -> FloatArray:
-    return value
+def _style(name: str) -> dict[str, Any]:
+    return {"color": COLORS[f"fusion/{name}"], "linestyle": DASHES[name], "linewidth": 1.0}
 
 
 def _write(out: Path, name: str, tables: Mapping[str, Table], figure: Figure) -> str:
     for table_name, table in tables.items():
         write_text(out / f"{table_name}.csv", csv_text(table))
-    # No date and fixed ids: equal numbers give equal files.
-    with mpl.rc_context({**PRINT, "svg.hashsalt": name}):
-        for kind, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 300})):
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=kind, **options)
-            write_bytes(out / f"{name}.{kind}", buffer.getvalue())
+    save(figure, out, name)
     return f"{name}: {', '.join(f'{table_name}.csv' for table_name in tables)}, {name}.svg, {name}.png"

@@ -32,10 +32,13 @@ def test_the_cases_are_what_they_say() -> None:
     white, pink = (sensors_of(case)["mhd_ars"].noise_psd(freq)[0] for case in ("clean", "1/f knee 10 Hz (MHD)"))
     assert pink / white == pytest.approx(2.0, rel=1e-12)
     assert not sensors_of("all", noise=False)["mhd_ars"].noise
-    for case, field in (("bias instability (gyro)", "bias_instability"), ("rate random walk (gyro)", "rate_random_walk")):
+    for case, field in (
+        ("bias instability (gyro)", "bias_instability"),
+        ("rate random walk (gyro)", "rate_random_walk"),
+    ):
         assert getattr(clean["mems_gyro"], field) == 0.0
         assert getattr(sensors_of(case)["mems_gyro"], field) > 0.0
-    assert list(CASES)[0] == "clean"
+    assert next(iter(CASES)) == "clean"
 
 
 @pytest.mark.oracle
@@ -49,7 +52,13 @@ def test_at_10_hz_the_mhd_sensors_defect_forces_its_own_error() -> None:
         for name in ("kalman", "arw_shakf"):
             # The lag and the misfit of (39), the clean belief error, add as phasors: the sum lies between both ends.
             assert abs(found[name].belief - forced) <= clean[name].belief
-            row = dict(zip(("rmse", "lowest", "highest", "aligned", "belief", "noise", "closure"), found[name].row(clean[name])[:7], strict=True))
+            row = dict(
+                zip(
+                    ("rmse", "lowest", "highest", "aligned", "belief", "noise", "closure"),
+                    found[name].row(clean[name])[:7],
+                    strict=True,
+                )
+            )
             # Over 2 s the slow part of either (crossover below 0.1 Hz) is a single draw, so that they are correlated by chance.
             assert row["closure"] == pytest.approx(1.0, abs=0.1)
             assert row["lowest"] <= row["rmse"] <= row["highest"]
