@@ -93,7 +93,7 @@ def fuse(readings: Mapping[str, FloatArray], sensors: Mapping[str, Sensor]) -> d
 
     Parameters
     ----------
-    readings : mapping of str to ndarray
+    readings : mapping of str to ndarray, shape (n_sample,)
         As from `read` [rad/s].
     sensors : mapping of str to Sensor
         Instruments by name, of which the filters learn the sample rates only.
@@ -115,7 +115,7 @@ def errors(
 
     Parameters
     ----------
-    found : mapping of str to ndarray
+    found : mapping of str to ndarray, shape (n_sample,)
         Rates as from `outputs` [rad/s].
     rate : ndarray, shape (n_time,)
         True rate at 20 kHz [rad/s].
