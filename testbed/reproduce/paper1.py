@@ -62,6 +62,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
     from testbed.reproduce.paper1_figures import write_figures
 
     protocol = protocol or Protocol()
+    yield f"moving the turntable: {', '.join(SIGNALS)}"
     rates = {signal: truth(signal, protocol) for signal in SIGNALS}
     yield from table_ii(rates, seeds, out, protocol)
     yield from table_ii_defects(rates, seeds, out, protocol)
