@@ -92,6 +92,7 @@ def smooth(values: FloatArray, t: FloatArray, length: float) -> FloatArray:
 
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.svg and `name`.png into `folder`: no date and fixed ids, so that equal numbers give equal files."""
+    figure.align_ylabels()
     with mpl.rc_context({**PRINT, "svg.hashsalt": name}):
         for kind, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 300})):
             buffer = io.BytesIO()
