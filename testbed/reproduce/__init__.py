@@ -16,7 +16,7 @@ PLANNED = ("paper3",)
 
 
 def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:
-    """Repeat the measurements of a paper, write its tables and yield the lines to print.
+    """Repeat the measurements of a paper, write its tables and figures and yield the lines to print.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:
     seeds : int
         Seeds 1 to this, of which each result is the median [-].
     out : Path
-        Folder of the tables; made if it does not exist.
+        Folder to write to; made if it does not exist.
 
     Yields
     ------

@@ -9,31 +9,55 @@ import numpy as np
 import pytest
 
 from testbed.models.motion import MotionProfile
-from testbed.reproduce.paper1 import BASE_HZ, FILTERS, PAPER, SENSORS, SIGNALS, Protocol, errors, report, truth
+from testbed.reproduce.paper1 import PAPER, report, table_ii
+from testbed.reproduce.paper1_defects import CASES
+from testbed.reproduce.paper1_runs import (
+    BASE_HZ,
+    DEG,
+    FILTERS,
+    SENSORS,
+    SIGNALS,
+    Protocol,
+    errors,
+    outputs,
+    presets,
+    truth,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 SHORT = Protocol(duration=2.0, settle=1.0)
+# Half of Table II, at 10 Hz three quarters; the mixed signal is half of the text's 0.0143 [deg/s].
+TARGETS = {"0.5 Hz": 0.0049, "4 Hz": 0.0035, "10 Hz": 0.0030, "mixed": 0.0071}
+
+
+def table(path: Path) -> dict[tuple[str, str], dict[str, str]]:
+    with path.open() as file:
+        return {(row["signal"], row["name"]): row for row in csv.DictReader(file)}
 
 
 @pytest.mark.slow
 def test_one_parameter_set_meets_table_ii_on_all_four_signals(tmp_path: Path) -> None:
-    """Median over ten seeds at or below the paper's own column, and no seed beyond it by half; SHAKF tuned at 0.5 Hz fails at 4 and 10 Hz."""
-    print(*report(10, tmp_path), sep="\n")
-    with (tmp_path / "table_ii.csv").open() as file:
-        table = {(row["signal"], row["name"]): row for row in csv.DictReader(file)}
-    assert len(table) == len(SIGNALS) * (len(SENSORS) + len(FILTERS))
+    """Median over ten seeds at or below the paper's own column, and no seed beyond it by half; `arw_shakf` at or below its targets.
+
+    SHAKF tuned at 0.5 Hz meets its own entry there and is at least ten times worse at 4 and 10 Hz.
+    """
+    rates = {signal: truth(signal, Protocol()) for signal in SIGNALS}
+    print(*table_ii(rates, 10, tmp_path, Protocol()), sep="\n")
+    rows = table(tmp_path / "table_ii.csv")
+    assert len(rows) == len(SIGNALS) * (len(SENSORS) + len(FILTERS))
     for signal in SIGNALS:
         proposed = PAPER[signal]["arw_shakf"]
         for name in ("kalman", "arw_shakf", "arw_shakf_literal"):
-            row = table[signal, name]
+            row = rows[signal, name]
             assert float(row["rmse_deg_s"]) <= proposed, row
             assert float(row["rmse_highest_deg_s"]) <= 1.5 * proposed, row
-    tuned = float(table["0.5 Hz", "shakf"]["rmse_deg_s"])
+        assert float(rows[signal, "arw_shakf"]["rmse_deg_s"]) <= TARGETS[signal]
+    tuned = float(rows["0.5 Hz", "shakf"]["rmse_deg_s"])
     assert tuned <= PAPER["0.5 Hz"]["shakf"]
     for signal in ("4 Hz", "10 Hz"):
-        assert float(table[signal, "shakf"]["rmse_deg_s"]) >= 10 * tuned
+        assert float(rows[signal, "shakf"]["rmse_deg_s"]) >= 10 * tuned
 
 
 def test_the_signals_are_the_papers() -> None:
@@ -48,8 +72,8 @@ def test_the_signals_are_the_papers() -> None:
 
 def test_sensors_alone_follow_their_transfer_functions() -> None:
     """At 10 Hz the closed form of a sine through equation (39): A |G - 1| / sqrt(2), phase included."""
-    rate = np.deg2rad(1.0) * np.sin(2 * np.pi * 10.0 * np.arange(round(2 * BASE_HZ)) / BASE_HZ)
-    found = errors(rate, "10 Hz", 1, SHORT)
+    rate = DEG * np.sin(2 * np.pi * 10.0 * np.arange(round(2 * BASE_HZ)) / BASE_HZ)
+    found = errors(outputs(rate, 1, presets()), rate, "10 Hz", SHORT)
     s = 2j * np.pi * 10.0
     gyro = (154.537 * s + 15.626) / (5.2175 * s**2 + 148.0 * s + 15.444)
     mhd = 2200.0 * s / (0.255 * s**2 + 2178.0 * s + 33900.0)
@@ -67,12 +91,19 @@ def test_the_truth_is_the_table_under_its_servo() -> None:
     assert 5e-4 < off < 3e-3
 
 
-def test_table_ii_is_written_with_the_papers_numbers(tmp_path: Path) -> None:
+def test_one_command_writes_both_tables_and_every_figure_with_its_numbers(tmp_path: Path) -> None:
     lines = list(report(1, tmp_path, SHORT))
-    assert len(lines) == 2 + len(SIGNALS) * (len(SENSORS) + len(FILTERS))
-    with (tmp_path / "table_ii.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    papers = {(row["signal"], row["name"]): row["paper_rmse_deg_s"] for row in rows}
-    assert float(papers["4 Hz", "shakf"]) == 0.1831
-    assert papers["mixed", "mhd_ars"] == ""
-    assert [p.name for p in tmp_path.iterdir()] == ["table_ii.csv"]
+    rows = table(tmp_path / "table_ii.csv")
+    assert float(rows["4 Hz", "shakf"]["paper_rmse_deg_s"]) == 0.1831
+    assert rows["mixed", "mhd_ars"]["paper_rmse_deg_s"] == ""
+    figures = {f"figure_{i}.{kind}" for i in (2, *range(6, 16)) for kind in ("csv", "svg", "png")}
+    assert {p.name for p in tmp_path.iterdir()} == figures | {
+        "table_ii.csv",
+        "table_ii_defects.csv",
+        "figure_6_measured.csv",
+        "figure_7_measured.csv",
+    }
+    assert sum(line.startswith("figure_") for line in lines) == 11
+    assert sum(any(case in line for case in CASES) for line in lines) >= len(SIGNALS) * len(CASES)
+    with (tmp_path / "table_ii_defects.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(CASES) * len(SIGNALS) * len(FILTERS)
