@@ -96,48 +96,54 @@ def medians(rates: Mapping[str, np.ndarray], forms: Mapping[str, Any], seeds: Se
     return np.median(found, axis=0)
 
 
-def tune(rate: np.ndarray, seeds: Sequence[int] = TUNING_SEEDS) -> dict[str, Any]:
-    """Print and return what tuning `shakf` at 0.5 Hz gives; the objective is the median complex RMSE there.
-
-    q by Brent's bounded search in log10 q over 1e-4 to 1 (deg/s)^2/s; then R of both sensors by Nelder and Mead in log10 R from the default,
-    within 1e-8 to 1 (deg/s)^2, once as the start of (17) and once with (17) off.
-    """
-    first = judged_from("0.5 Hz")
+def objective_at_half_a_hertz(rate: np.ndarray, seeds: Sequence[int] = TUNING_SEEDS) -> Callable[..., float]:
+    """Return what tuning makes small: the median error [deg/s] of `shakf` with given parameters on the 0.5 Hz signal."""
     records = [readings(rate, seed) for seed in seeds]
 
-    def objective(**own: Any) -> float:
-        return float(np.median([run(z, rate, first, "shakf", **own)[0] for z in records]))
+    def error(**own: Any) -> float:
+        return float(np.median([run(z, rate, judged_from("0.5 Hz"), "shakf", **own)[0] for z in records]))
 
+    return error
+
+
+def tune_q(objective: Callable[..., float]) -> tuple[float, float, int]:
+    """Return the q [(deg/s)^2/s] that Brent's bounded search in log10 q finds between 1e-4 and 1, its error [deg/s], and the runs it took."""
     best = minimize_scalar(
         lambda p: objective(q=10.0**p * DEG**2), bounds=(-4.0, 0.0), method="bounded", options={"xatol": 0.02}
     )
-    found: dict[str, Any] = {"q": 10.0**best.x, "error": best.fun, "shipped": objective()}
-    print(
-        f"\nq tuned at 0.5 Hz: {found['q']:.4f} (deg/s)^2/s, error {best.fun:.5f} ({best.nfev} runs of {len(records)} seeds)"
-    )
-    print(f"shipped: 0.0056, error {found['shipped']:.5f}, {100.0 * (found['shipped'] / best.fun - 1.0):.2f} % above")
-    for label, own in (("start of (17)", {}), ("fixed, (17) off", {"adapt": ()})):
-        R, error, runs = tune_R(lambda R0, own=own: objective(R0=R0, **own))
-        listed = ", ".join(f"{name} {value / DEG**2:.1e}" for name, value in R.items())
-        print(f"R tuned at 0.5 Hz, {label}: {listed} (deg/s)^2, error {error:.5f} ({runs} runs)")
-        found[label] = R
-    return found
+    return 10.0**best.x, best.fun, best.nfev
 
 
-def tune_R(objective: Callable[[dict[str, float]], float]) -> tuple[dict[str, float], float, int]:
-    """Return the R of both sensors [rad^2/s^2] that Nelder and Mead find for an objective of them, its value, and the runs it took."""
+def tune_R(objective: Callable[..., float], **own: Any) -> tuple[dict[str, float], float, int]:
+    """Return the R0 of both sensors [rad^2/s^2] that Nelder and Mead find in log10 R from the default, its error [deg/s], and the runs."""
 
     def sensors(p: np.ndarray) -> dict[str, float]:
         return dict(zip(("mems_gyro", "mhd_ars"), 10.0**p * DEG**2, strict=True))
 
     best = minimize(
-        lambda p: objective(sensors(p)),
+        lambda p: objective(R0=sensors(p), **own),
         (-4.0, -6.2),
         method="Nelder-Mead",
         bounds=[(-8.0, 0.0)] * 2,
         options={"xatol": 0.1, "fatol": 1e-6, "initial_simplex": [[-4.0, -6.2], [-3.0, -6.2], [-4.0, -5.2]]},
     )
     return sensors(best.x), best.fun, best.nfev
+
+
+def tuned_forms(rate: np.ndarray) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Print what tuning at 0.5 Hz gives, and return the forms with the R found."""
+    objective = objective_at_half_a_hertz(rate)
+    q, error, runs = tune_q(objective)
+    shipped = objective()
+    print(f"\nq of `shakf` tuned at 0.5 Hz: {q:.4f} (deg/s)^2/s, error {error:.5f} deg/s ({runs} runs)")
+    print(f"the shipped 0.0056: error {shipped:.5f} deg/s, {100.0 * (shipped / error - 1.0):.2f} % above")
+    forms = {}
+    for label, own in (("`shakf`, R0 tuned", {}), ("`shakf`, R fixed and tuned", {"adapt": ()})):
+        R, error, runs = tune_R(objective, **own)
+        listed = ", ".join(f"{name} {value / DEG**2:.1e}" for name, value in R.items())
+        print(f"{label}: {listed} (deg/s)^2, error {error:.5f} deg/s ({runs} runs)")
+        forms[label] = ("shakf", {"R0": R, **own})
+    return forms
 
 
 def table(title: str, rows: Sequence[str], columns: Sequence[str], values: np.ndarray, digits: int) -> None:
@@ -153,11 +159,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="seeds 1 to this (%(default)s)")
     seeds = range(1, parser.parse_args().seeds + 1)
     rates = {signal: truth(signal, PROTOCOL) for signal in SIGNALS}
-    tuned = tune(rates["0.5 Hz"])
-    forms = FORMS | {
-        "`shakf`, R0 tuned": ("shakf", {"R0": tuned["start of (17)"]}),
-        "`shakf`, R fixed and tuned": ("shakf", {"adapt": (), "R0": tuned["fixed, (17) off"]}),
-    }
+    forms = FORMS | tuned_forms(rates["0.5 Hz"])
     rates |= {signal: beyond(signal) for signal in BEYOND}
     found = medians(rates, forms, seeds)
     table(f"Error [deg/s], median of {len(seeds)} seeds", list(forms), list(rates), found[..., 0], 4)
