@@ -4,7 +4,7 @@ Simulated `sx300` and `adis16505_filtered` with all their noise; belief `eq39` u
 1, 2, ... The four signals of Table II are the truth of the simulated table, 20 s, judged from 10 s on; the signals beyond them are ideal
 sines over the same times, the jump (0.5 Hz to 10 Hz at 10 s) judged from 15 s on. Tuning uses seeds from 101 on, and 0.5 Hz only.
 
-Run it with ``python examples/ablation.py [--seeds N]`` (default 3: about two minutes of processor time).
+Run it with ``python examples/ablation.py [--seeds N]`` (default 3: about a minute and a half of processor time).
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ FORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "literal + clamp 3": ("arw_shakf_literal", LITERAL | {"clamp": 3.0}),
     "literal + freeze": ("arw_shakf_literal", LITERAL | {"clamp": 1.0}),
     "literal + freeze, no S": ("arw_shakf_literal", LITERAL | {"clamp": 1.0, "alpha": 0.0}),
+    "literal + freeze + fading, no S": ("arw_shakf_literal", LITERAL | {"clamp": 1.0, "alpha": 0.0, "memory": 1.0}),
     "literal + differences": ("arw_shakf_literal", LITERAL | {"innovation": "difference"}),
     "literal + fading + clamp 3 + low bands": (
         "arw_shakf_literal",
