@@ -1,4 +1,4 @@
-"""Beliefs from measured frequency responses: a transfer function of given order by weighted least squares."""
+"""Beliefs from measurements: the response to a sine, and a transfer function of given order fitted to responses by least squares."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from testbed.fusion.belief import SensorBelief
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from testbed.signals import ComplexArray, FloatArray
 
 _ROUNDS = 200
@@ -49,6 +51,50 @@ class Identified:
             input_noise=input_noise,
             output_noise=output_noise,
         )
+
+
+def sine_response(
+    reading: ArrayLike, sample_rate_hz: float, freq_hz: float, amplitude: float, *, settle: float = 0.0
+) -> complex:
+    r"""Return the frequency response at one point of a stepped-sine sweep: gain and phase of a sensor shaken by A sin(2 pi f t).
+
+    .. math:: \min \sum_k (z_k - c_0 - c_1 t_k - a \sin 2 \pi f t_k - b \cos 2 \pi f t_k)^2, \quad G = (a + j b) / A
+
+    over the last whole periods of the record after `settle`. Offset and drift go with the fit, so that a slow transient does not count as response.
+    White noise of two-sided root density N leaves a standard deviation of N sqrt(2/T)/A in either part of G, T the time fitted.
+
+    Parameters
+    ----------
+    reading : array_like, shape (n_time,)
+        Readings [rad/s], the first at t = 0.
+    sample_rate_hz, freq_hz : float
+        Rate of the readings and frequency of the sine [Hz].
+    amplitude : float
+        A [rad/s].
+    settle : float, optional
+        Time at the start that is left out [s].
+
+    Returns
+    -------
+    complex
+        G(j 2 pi f) [-].
+
+    Raises
+    ------
+    ValueError
+        If less than a period is left, or the frequency is not below half the sample rate.
+    """
+    z = np.asarray(reading, float)
+    periods = np.floor((z.size / sample_rate_hz - settle) * freq_hz + 1e-9)
+    if not (0.0 < freq_hz < sample_rate_hz / 2.0 and periods >= 1.0):
+        msg = f"reading: expected at least a period of {freq_hz:g} Hz, below {sample_rate_hz / 2.0:g} Hz, got {z.size} samples and {settle:g} s to settle"
+        raise ValueError(msg)
+    first = z.size - round(periods * sample_rate_hz / freq_hz)
+    t = np.arange(first, z.size) / sample_rate_hz
+    turn = 2.0 * np.pi * freq_hz * t
+    basis = np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(t), t - t.mean()])
+    a, b = np.linalg.lstsq(basis, z[first:], rcond=None)[0][:2]
+    return complex(a, b) / amplitude
 
 
 def identify(

@@ -9,7 +9,7 @@ import pytest
 
 from testbed.fusion import estimate
 from testbed.fusion.allan_srkf import AllanSrkf, AllanSrkfParameters
-from testbed.fusion.arw_shakf import increment_variance
+from testbed.fusion.bands import increment_variance
 from testbed.fusion.belief import default_belief, load_belief
 from testbed.fusion.model import build_model
 from testbed.signals import random_stream

@@ -3,26 +3,31 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import jsonschema
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from ruamel.yaml import YAML
 
+from testbed import ScenarioError, load_scenario
+from testbed.catalogue import schema
 from testbed.fusion import estimate
 from testbed.fusion.arw_shakf import (
     ArwShakf,
     ArwShakfLiteral,
     ArwShakfLiteralParameters,
     ArwShakfParameters,
-    Bands,
-    calibrate_bands,
-    increment_variance,
 )
+from testbed.fusion.bands import Bands, calibrate_bands, increment_variance
 from testbed.fusion.belief import default_belief
 from testbed.fusion.kalman import Kalman, KalmanParameters
 from testbed.fusion.kernels import SENSOR, inflation
 from testbed.fusion.model import build_model
+from testbed.store import write_scenario
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from testbed.signals import FloatArray
 
 DEG = np.pi / 180.0
@@ -225,3 +230,48 @@ def test_bands_are_checked() -> None:
         ArwShakfParameters.model_validate(
             {"bands": {"mhd_ars": {"thresholds": [1e-9, 2e-9], "R": [1, 1, 1]}}}, context={"border": True}
         )
+
+
+def test_shipped_bands_are_the_default_and_named_by_estimate(readings: dict[str, FloatArray]) -> None:
+    named = ArwShakfParameters(bands="sx300_adis16505")
+    assert named == ArwShakfParameters()
+    gyro, mhd = (named.bands[name] for name in RATES)
+    assert gyro.thresholds == (1.0e-5 * DEG**2, 3.8e-5 * DEG**2)
+    assert gyro.R == (1e-4 * DEG**2, 1e-3 * DEG**2, 1e-2 * DEG**2)
+    assert mhd.thresholds == (7.0e-7 * DEG**2, 1.5e-6 * DEG**2)
+    assert mhd.R == (6.5e-7 * DEG**2, 2e-7 * DEG**2, 1e-7 * DEG**2)
+    # The literal form judges from the second reading on; with the shipped bands it waits as they say.
+    own, waiting = (
+        estimate("arw_shakf_literal", readings, sample_rate_hz=RATES, **chosen).diagnostics["band_mhd_ars"]
+        for chosen in ({}, {"bands": "sx300_adis16505"})
+    )
+    assert [np.flatnonzero(np.isfinite(band))[0] for band in (own, waiting)] == [1, 200]
+    assert np.array_equal(own[300:], waiting[300:], equal_nan=True)
+
+
+def test_bands_that_are_not_shipped_are_refused() -> None:
+    with pytest.raises(ValidationError, match=r"unknown set of bands 'sx300' \(known: .*sx300_adis16505"):
+        ArwShakfParameters(bands="sx300")
+
+
+def test_a_scenario_may_name_bands_and_keeps_their_limits(tmp_path: Path) -> None:
+    text = """
+name: banded
+duration: 1 s
+turntable: {mode: fixed}
+motion: [{sine: {frequency: 4 Hz, rate: 1 deg/s}}]
+sensors: {mhd_ars: {preset: sx300}, mems_gyro: {preset: adis16505_filtered}}
+fusion: {arw_shakf_literal: {bands: BANDS}}
+"""
+    path = tmp_path / "banded.yaml"
+    path.write_text(text.replace("BANDS", "sx300_adis16505"))
+    jsonschema.validate(YAML(typ="safe", pure=True).load(path.read_text()), schema())
+    scenario = load_scenario(path)
+    write_scenario(tmp_path, scenario.resolved(), {})
+    first, second = (
+        one.fusion["arw_shakf_literal"].parameters for one in (scenario, load_scenario(tmp_path / "scenario.yaml"))
+    )
+    assert first == second == ArwShakfLiteralParameters(bands="sx300_adis16505")
+    path.write_text(text.replace("BANDS", "sx300"))
+    with pytest.raises(ScenarioError, match="unknown set of bands 'sx300'"):
+        load_scenario(path)
