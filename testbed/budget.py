@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Where the first band of a budget begins, as the integral of the floor does.
 _LOWEST_HZ = 1e-6
+_BLIND = 1e30
 _FIT_HZ = np.logspace(-2.0, 3.0, 121)
 _FIT_MISFIT = 1e-3
 # (real poles, pairs) in the order in which they are tried.
@@ -44,7 +45,8 @@ def crossovers(
         Where to look [Hz].
     """
     freq = np.logspace(np.log10(low_hz), np.log10(high_hz), 4001)
-    ratio = np.log(first(freq) / second(freq))
+    # Where a sensor is blind its density is infinite.
+    ratio = np.log(np.fmin(first(freq), _BLIND) / np.fmin(second(freq), _BLIND))
     (at,) = np.nonzero(np.sign(ratio[1:]) != np.sign(ratio[:-1]))
     part = ratio[at] / (ratio[at] - ratio[at + 1])
     crossing: FloatArray = freq[at] * (freq[at + 1] / freq[at]) ** part
@@ -94,8 +96,11 @@ def budget_summary(psds: Mapping[str, Callable[[FloatArray], FloatArray]], bandw
     """
     edges = [_LOWEST_HZ, *(10.0**k for k in range(-3, 7) if 10.0**k < bandwidth_hz), bandwidth_hz]
     shares = noise_budget(psds, edges)
+    # Below the lowest frequency the densities are taken as constant, as for the floor.
+    information = {name: 1.0 / float(psd(np.array([_LOWEST_HZ]))[0]) for name, psd in psds.items()}
+    for name, share in shares.items():
+        share[0] += 2.0 * _LOWEST_HZ * information[name] / sum(information.values()) ** 2
     total = np.sum(list(shares.values()), axis=0)
-    # Below the lowest frequency the floor is taken as constant: nothing that shows.
     bands = [
         {
             "low_hz": 0.0 if i == 0 else edges[i],

@@ -159,7 +159,9 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float]) -> list[str]:
     cells += ["-" if not bound or rmse is None else f"{rmse / bound:.1f}" for bound in bounds]
     for line in shown:
         entry = gains[line]
-        cells.append("-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg{_over(entry)}")
+        cells.append(
+            "-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg{_over(entry)}"
+        )
     return cells
 
 

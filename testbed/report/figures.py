@@ -43,7 +43,7 @@ def _draw(axes: Axes, envelope: Envelope, color: str, width: float, alpha: float
     )
 
 
-def _arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:
+def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:
     """Put the legend above the axes, in equal rows as wide as its longest name allows, and set the margins in inches.
 
     Solving for the layout would cost as much time as drawing the figure.
@@ -70,7 +70,7 @@ def _arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42
     )
 
 
-def _label(group: str) -> str:
+def label(group: str) -> str:
     """Return the instance's name; a dollar sign would start a formula."""
     return group.split("/", 1)[-1].replace("$", r"\$")
 
@@ -115,11 +115,11 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
             axes.grid(visible=True)
         below.set_xlabel("time [s]")
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=_label(group))
+            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=label(group))
             for group, width in widths.items()
         ]
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
-        _arrange(figure, [dotted, *handles], gap_in=0.62)
+        arrange(figure, [dotted, *handles], gap_in=0.62)
     return figure
 
 
@@ -148,7 +148,7 @@ def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
             axes.axvspan(0, digest.settle_s, color=INK, alpha=0.08, linewidth=0)
             inside = "undefined" if trace.inside is None else f"{100 * trace.inside:.1f} %"
             axes.set_title(
-                f"{_label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
+                f"{label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
             )
         panels[-1].set_xlabel("time [s]")
         panels[-1].set_xlim(0, digest.duration_s)
@@ -158,7 +158,7 @@ def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         ]
         if digest.settle_s > 0:
             handles.append(Patch(facecolor=INK, alpha=0.08, label="before settle, not judged"))
-        _arrange(figure, handles)
+        arrange(figure, handles)
     return figure
 
 
@@ -233,7 +233,7 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
                     color=colors[f"{kind}/{name}"],
                     linewidth=width,
                     linestyle=DASHES[i % len(DASHES)],
-                    label=_label(name),
+                    label=label(name),
                 )
         if floor is not None:
             handles += axes.plot(
@@ -245,7 +245,7 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
                 label="noise floor",
             )
         _frame_spectrum(axes, digest)
-        _arrange(figure, handles)
+        arrange(figure, handles)
     return figure
 
 
