@@ -75,7 +75,7 @@ def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.grid(visible=True)
-        arrange(figure, handles)
+        arrange(figure, [*handles])
     return figure
 
 
@@ -116,7 +116,7 @@ def line_optima(metrics: RunMetrics) -> dict[float, float]:
     metrics : RunMetrics
         Of the run.
     """
-    found = {}
+    found: dict[float, float] = {}
     for source in metrics.fusion.values():
         found |= {line.frequency_hz: line.optimum_deg_s for line in source.lines or [] if line.optimum_deg_s}
     return found
