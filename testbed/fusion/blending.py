@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.fusion.two_paths import Paths, TwoPaths, best_crossover, inverse, realised, zeros_at_dc
+from testbed.fusion.two_paths import Paths, TwoPaths, inverse, realised, zeros_at_dc
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
@@ -40,15 +40,15 @@ class Blending(TwoPaths):
     Franklin, Powell, Workman, Digital Control of Dynamic Systems (1998), chapter 4 (sampled loops).
     """
 
-    def best_crossover_hz(self, slow: SensorBelief, fast: SensorBelief) -> float:
-        """Return the natural frequency of the loop that leaves the least noise [Hz].
+    def order(self, fast: SensorBelief) -> int:
+        """Return the order of the loop [-].
 
         Parameters
         ----------
-        slow, fast : SensorBelief
-            The sensor that is better at low frequency, and the other.
+        fast : SensorBelief
+            The sensor that is better at high frequency.
         """
-        return best_crossover(slow, fast, 2) / (2.0 * math.pi)
+        return 2
 
     def paths(
         self, slow: SensorBelief, fast: SensorBelief, crossover: float, band: tuple[FloatArray, FloatArray]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from testbed.fusion.two_paths import Paths, TwoPaths, best_crossover, inverse, low_pass, realised, zeros_at_dc
+from testbed.fusion.two_paths import Paths, TwoPaths, inverse, low_pass, realised, zeros_at_dc
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
@@ -39,15 +38,15 @@ class Complementary(TwoPaths):
     Aerospace and Electronic Systems 11 (1975) 321-325 (its equivalence to the settled Kalman filter).
     """
 
-    def best_crossover_hz(self, slow: SensorBelief, fast: SensorBelief) -> float:
-        """Return the corner of L that leaves the least noise [Hz].
+    def order(self, fast: SensorBelief) -> int:
+        """Return the number of zeros of the fast sensor at s = 0 that 1 - L has to cancel, at least one [-].
 
         Parameters
         ----------
-        slow, fast : SensorBelief
-            The sensor that is better at low frequency, and the other.
+        fast : SensorBelief
+            The sensor that is better at high frequency.
         """
-        return best_crossover(slow, fast, _order(fast)) / (2.0 * math.pi)
+        return max(zeros_at_dc(fast), 1)
 
     def paths(
         self, slow: SensorBelief, fast: SensorBelief, crossover: float, band: tuple[FloatArray, FloatArray]
@@ -68,7 +67,7 @@ class Complementary(TwoPaths):
         ValueError
             If a sensor's inverse is unstable.
         """
-        order = _order(fast)
+        order = self.order(fast)
         of_slow, poles = low_pass(order, crossover)
         # The zeros of 1 - L at s = 0 take those of the fast sensor away.
         of_fast = np.concatenate([poles[:-order], np.zeros(order - zeros_at_dc(fast))])
@@ -93,10 +92,6 @@ class Complementary(TwoPaths):
             J=model.D * high.D,
             innovate=False,
         )
-
-
-def _order(fast: SensorBelief) -> int:
-    return max(zeros_at_dc(fast), 1)
 
 
 def _product(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:

@@ -258,7 +258,8 @@ class TwoPaths(BlockFilter):
         super().__init__(belief, sample_rate_hz, FilterParameters(order=1, q=0.0))
         self._slow, self._fast = _roles(belief, self.model)
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
-        self.crossover_hz = parameters.crossover or self.best_crossover_hz(slow, fast)
+        order = self.order(fast)
+        self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
         power = parameters.amplitude**2 / 2.0
 
         def candidate(bandwidth_hz: float) -> tuple[Paths, FloatArray]:
@@ -269,23 +270,24 @@ class TwoPaths(BlockFilter):
 
         self.bandwidth_hz = parameters.bandwidth or _best_bandwidth(candidate, self.model.sample_rate_hz)
         paths, settled = candidate(self.bandwidth_hz)
-        T, w = 1.0 / self.model.sample_rate_hz, 2.0 * math.pi * self.crossover_hz
+        T = 1.0 / self.model.sample_rate_hz
+        slowest = np.min(-np.roots(low_pass(order, 2.0 * math.pi * self.crossover_hz)[1]).real)
         low = np.array([1e-3 * self.crossover_hz])
         drift = float((2.0 * math.pi * low[0]) ** 2 * input_psd(fast)(low)[0])
         forgotten = math.sqrt(drift) / fast.output_noise
         patience = 2 * self.model.strides[self._slow]
         setting = (paths.innovate, T, 2.0 * math.pi * parameters.frequency, power, forgotten, drift)
-        self._setting = np.array([*setting, math.exp(-2.0 * w * T), patience])
+        self._setting = np.array([*setting, math.exp(-2.0 * slowest * T), patience])
         self._x, self._memory = np.zeros(len(paths.A)), np.zeros(MEMORY_ROWS)
         self._matrices = (*paths.discrete(T), paths.C, paths.D, paths.H, paths.J, settled)
 
-    def best_crossover_hz(self, slow: SensorBelief, fast: SensorBelief) -> float:
-        """Return the crossover that leaves the least noise [Hz].
+    def order(self, fast: SensorBelief) -> int:
+        """Return the order of the low-pass L at the crossover [-].
 
         Parameters
         ----------
-        slow, fast : SensorBelief
-            The sensor that is better at low frequency, and the other.
+        fast : SensorBelief
+            The sensor that is better at high frequency.
         """
         raise NotImplementedError
 

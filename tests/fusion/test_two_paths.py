@@ -41,6 +41,14 @@ def test_crossover_is_the_closed_form(order: int, divisor: float) -> None:
     assert found == pytest.approx(CORNER * SMALL / N / divisor, rel=0.02, abs=0.0)
 
 
+@pytest.mark.parametrize(("cls", "crossover"), [(Complementary, 5.60e-3), (Blending, 3.24e-3)])
+def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) -> None:
+    found = cls(load_belief("identified"), RATES, TwoPathParameters())
+    assert found.crossover_hz == pytest.approx(crossover, rel=2e-3, abs=0.0)
+    # The search ends within 1 %.
+    assert found.bandwidth_hz == pytest.approx(169.0, rel=0.02)
+
+
 @pytest.mark.oracle
 def test_no_first_order_crossover_beats_the_derived_one_and_the_optimum_is_not_beaten() -> None:
     belief = load_belief("identified")
@@ -160,42 +168,46 @@ def test_claimed_noise_is_the_scatter_of_many_runs(cls: Any, noise_of_many: np.n
 
 @pytest.mark.oracle
 @pytest.mark.parametrize("where", ["input_noise", "output_noise"])
-def test_noise_variance_of_the_plain_pair_is_the_closed_form(where: str) -> None:
-    """N^2 w / 2 + n^2 w_c^2 / (2 w) = N n w_c at w = w_c n / N, and n^2 times the integral of |B|^2, 5/3 of the corner of B for order 3."""
+@pytest.mark.parametrize(("cls", "factor"), [(Complementary, 1.0), (Blending, np.sqrt(1.5))])
+def test_noise_variance_of_the_plain_pair_is_the_closed_form(cls: Any, factor: float, where: str) -> None:
+    """N^2 w / 2 + n^2 w_c^2 / (2 w) = N n w_c at w = w_c n / N, sqrt(3/2) of it for the loop; n^2 integral of |B|^2, 5/3 of B's corner."""
     noise = {"input_noise": 1e-9, "output_noise": 1e-9, where: N}
     slow = PLAIN["mems_gyro"].model_copy(update=noise)
     fast = PLAIN["mhd_ars"]
-    found = Complementary({"mems_gyro": slow, "mhd_ars": fast}, RATES, TwoPathParameters(bandwidth=20.0))
+    found = cls({"mems_gyro": slow, "mhd_ars": fast}, RATES, TwoPathParameters(bandwidth=20.0))
     band = band_end(slow, fast, 2.0 * np.pi * 20.0)
     paths = found.paths(slow, fast, 2.0 * np.pi * found.crossover_hz, band)
-    wanted = N * SMALL * CORNER + 5.0 / 3.0 * 2.0 * np.pi * 20.0 * SMALL**2
+    wanted = factor * N * SMALL * CORNER + 5.0 / 3.0 * 2.0 * np.pi * 20.0 * SMALL**2
     # The crossover is within 2 % of its flat minimum; sampling folds (a T)^2 / 12 = 0.2 % of the gyro's noise back.
     assert noise_variance(paths, found.model, 0, 1).mean() == pytest.approx(wanted, rel=0.006, abs=0.0)
 
 
 @pytest.mark.oracle
 @pytest.mark.parametrize("cls", FILTERS)
-def test_paths_add_up_in_continuous_time(cls: Any) -> None:
-    """Exact readings of a rate: B for side by side paths, (B + P G) / (1 + P G) for the loop, P = (k_p s + k_i) / s^2."""
+def test_share_of_each_path_in_continuous_time(cls: Any) -> None:
+    """B L and B (1 - L) side by side; P G / (1 + P G) and B / (1 + P G) for the loop, P = (k_p s + k_i) / s^2."""
     slow, fast = (load_belief("identified")[name] for name in ("mems_gyro", "mhd_ars"))
     w = 2.0 * np.pi * 0.05
     band = band_end(slow, fast, 2.0 * np.pi * 200.0)
     paths = cls(load_belief("identified"), RATES, TwoPathParameters()).paths(slow, fast, w, band)
     freq = np.array([0.003, 0.05, 0.3, 8.0, 150.0, 900.0])
     s = 2j * np.pi * freq
-    wanted = np.polyval(band[0], s) / np.polyval(band[1], s)
+    end = np.polyval(band[0], s) / np.polyval(band[1], s)
     of_slow, of_fast = (one.realisation().response(freq) for one in (slow, fast))
     if paths.innovate:
         loop = (np.sqrt(2.0) * w * s + w**2) / s**2 * of_slow
-        wanted = (wanted + loop) / (1.0 + loop)
-    for k, at in enumerate(s):
-        A = paths.A - paths.innovate * np.outer(paths.E, paths.H)
-        held = of_slow[k] - paths.innovate * paths.J * of_fast[k]
-        x = np.linalg.solve(at * np.eye(len(A)) - A, paths.B * of_fast[k] + paths.E * held)
-        # Polynomials of degree ten over seven decades keep nine digits.
-        assert abs(paths.C @ x + paths.D * of_fast[k] - wanted[k]) < 1e-8
-        # And the slow reading is foreseen as the slow sensor reads the estimate.
-        assert abs(paths.H @ x + paths.J * of_fast[k] - of_slow[k] * wanted[k]) < 1e-8
+        shares = loop / (1.0 + loop), end / (1.0 + loop)
+    else:
+        shares = end * w / (s + w), end * s / (s + w)
+    for wanted, slow_part, fast_part in zip(shares, (of_slow, 0.0 * of_slow), (0.0 * of_fast, of_fast), strict=True):
+        for k, at in enumerate(s):
+            A = paths.A - paths.innovate * np.outer(paths.E, paths.H)
+            held = slow_part[k] - paths.innovate * paths.J * fast_part[k]
+            x = np.linalg.solve(at * np.eye(len(A)) - A, paths.B * fast_part[k] + paths.E * held)
+            # Polynomials of degree ten over seven decades keep nine digits.
+            assert abs(paths.C @ x + paths.D * fast_part[k] - wanted[k]) < 1e-8
+            # And the slow reading is foreseen as the slow sensor reads the estimate.
+            assert abs(paths.H @ x + paths.J * fast_part[k] - of_slow[k] * wanted[k]) < 1e-8
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -235,7 +247,9 @@ def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> N
         found = cls(QUICK, RATES, TwoPathParameters(crossover=1.0, bandwidth=300.0))
         z = {"mems_gyro": np.zeros(8000), "mhd_ars": np.full(80_000, 1e-4)}
         left[cls] = abs(found.process(z).rate[-1]) / 1e-4
-    assert left[Complementary] > 1.0
+    low = 1e-3
+    w_c = 2.0 * np.pi * low / abs(QUICK["mhd_ars"].realisation().response(np.array([low]))[0])
+    assert left[Complementary] == pytest.approx(w_c / (2.0 * np.pi), rel=1e-3)
     assert left[Blending] < 1e-3
 
 
