@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.fusion.two_paths import Paths, TwoPaths, inverse, realised, zeros_at_dc
+from testbed.fusion.two_path_design import Paths, inverse, realised, zeros_at_dc
+from testbed.fusion.two_paths import TwoPaths
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import block_diag
 
-from testbed.fusion.two_paths import Paths, TwoPaths, inverse, low_pass, realised, zeros_at_dc
+from testbed.fusion.two_path_design import Paths, inverse, low_pass, realised, zeros_at_dc
+from testbed.fusion.two_paths import TwoPaths
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
@@ -19,7 +20,7 @@ class Complementary(TwoPaths):
 
     .. math:: \hat\omega = B \left( L \frac{z_{slow}}{G_{slow}} + (1 - L) \frac{z_{fast}}{G_{fast}} \right)
 
-    L = w_c / (s + w_c): the paths add up to B, which is 1 up to the bandwidth (`testbed.fusion.two_paths`). For a fast sensor whose noise
+    L = w_c / (s + w_c): the paths add up to B, which is 1 up to the bandwidth (`testbed.fusion.two_path_design`). For a fast sensor whose noise
     rises as 1/f towards low frequency and white noise of the slow one no causal L is better; one more zero of the fast sensor at s = 0
     makes it one order higher. While the slow sensor is missing its reading is predicted from the estimate.
 

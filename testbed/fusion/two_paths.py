@@ -1,28 +1,26 @@
-r"""Two sensors, each through a fixed linear path: what the complementary and the blending filter share.
-
-The fast path inverts the sensor that is quieter at high frequency, up to a bandwidth; the slow path takes the other one over below a
-crossover. Both are low-passes of the form that the settled Kalman filter of a signal of order m has,
-
-.. math:: L_m(s) = 1 - s^m / b_m(s / w)\,w^{-m},
-
-b_m the Butterworth polynomial: they lag in the m-th derivative only.
-"""
+"""Two sensors, each through a fixed linear path: what the complementary and the blending filter share."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
-from scipy.signal import buttap
 
 from testbed.fusion.base import BlockFilter, EstimateBlock, FilterParameters
-from testbed.fusion.belief import SensorBelief
 from testbed.fusion.kernels import RATE, STD
+from testbed.fusion.two_path_design import (
+    HIGH_HZ,
+    LOW_HZ,
+    Paths,
+    band_end,
+    best_crossover,
+    input_psd,
+    low_pass,
+)
 from testbed.fusion.two_path_kernel import MEMORY_ROWS, OUT_ROWS, SLOW_INNOVATION, two_paths
+from testbed.fusion.two_path_noise import noise_variance
 from testbed.parts import Part
 from testbed.units import Frequency, Range
 
@@ -31,15 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from testbed.fusion.belief import Realisation
+    from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
     from testbed.signals import FloatArray
-
-# Order of the band end: the rate through three integrators, as in the optimum of most signals.
-BAND_ORDER = 3
-# Where the two sensors are compared, and the crossover is looked for.
-LOW_HZ, HIGH_HZ = 1e-5, 1e3
-_DOUBLINGS = 40
 
 
 class TwoPathParameters(Part):
@@ -59,173 +51,6 @@ class TwoPathParameters(Part):
     bandwidth: Frequency | None = None
     frequency: Frequency = 10.0
     amplitude: Range = math.radians(1.0)
-
-
-@dataclass(frozen=True)
-class Paths:
-    r"""The two paths in continuous time: x' = A x + B z + E h, rate = C x + D z, predicted slow reading = H x + J z.
-
-    z is the fast reading, h what is held of the slow one: the reading, or what it has beyond the prediction.
-
-    Parameters
-    ----------
-    A : ndarray, shape (n_state, n_state)
-        Dynamics [1/s].
-    B, E, C, H : ndarray, shape (n_state,)
-        Inputs [1/s] and outputs [-].
-    D, J : float
-        Feed-through [-].
-    innovate : bool
-        h is the innovation of the slow sensor and not its reading.
-    """
-
-    A: FloatArray
-    B: FloatArray
-    E: FloatArray
-    C: FloatArray
-    D: float
-    H: FloatArray
-    J: float
-    innovate: bool
-
-    def discrete(self, T: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return (Phi, Gamma, ramp, E) over a step T [s], exact for z linear and h constant between samples.
-
-        Parameters
-        ----------
-        T : float
-            Step [s].
-        """
-        n = len(self.A)
-        block = np.zeros((n + 3, n + 3))
-        block[:n, :n], block[:n, n], block[:n, n + 2] = self.A * T, self.B * T, self.E * T
-        block[n, n + 1] = 1.0
-        power = expm(block)
-        Phi, Gamma, ramp, E = power[:n, :n], power[:n, n], power[:n, n + 1], power[:n, n + 2]
-        return Phi.copy(), Gamma.copy(), ramp.copy(), E.copy()
-
-
-def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of L with 1 - L = O(s^order), highest power first.
-
-    Parameters
-    ----------
-    order : int
-        Power of s that 1 - L starts with [-].
-    w : float
-        Corner of the Butterworth poles [rad/s].
-    poles : int, optional
-        Their number [-]; `order` if not given, more make L fall faster.
-    """
-    n = poles or order
-    a = np.real(np.poly(buttap(n)[1])) * w ** np.arange(n + 1)
-    return a[-order:], a
-
-
-def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
-    """Return the two-sided input-referred noise density of a belief, Hz -> rad^2/s.
-
-    Parameters
-    ----------
-    sensor : SensorBelief
-        Dynamics and noise.
-    """
-    realised = sensor.realisation()
-
-    def psd(freq_hz: FloatArray) -> FloatArray:
-        density: FloatArray = sensor.input_noise**2 + sensor.output_noise**2 / np.abs(realised.response(freq_hz)) ** 2
-        return density
-
-    return psd
-
-
-def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int) -> float:
-    r"""Return the corner w [rad/s] of L that leaves the least noise.
-
-    .. math:: \min_w \int |L|^2 S_{slow} + |1 - L|^2 S_{fast}\, df
-
-    by trapezoid in ln f from 1e-5 Hz to 1 kHz, 100 points per decade. For white noise N of the slow sensor and n (1 + (w_c / w)^2)^(1/2) of
-    the fast one it is w_c n / N for order 1 and w_c n / N / sqrt(3) for order 2.
-
-    Parameters
-    ----------
-    slow, fast : SensorBelief
-        The sensor that is better at low frequency, and the other.
-    order : int
-        Order of L.
-    """
-    freq = np.logspace(math.log10(LOW_HZ), math.log10(HIGH_HZ), 801)
-    s = 2j * np.pi * freq
-    of_slow, of_fast = input_psd(slow)(freq), input_psd(fast)(freq)
-
-    def noise(log_w: float) -> float:
-        b, a = low_pass(order, math.exp(log_w))
-        L = np.polyval(b, s) / np.polyval(a, s)
-        return math.log(np.trapezoid((np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast) * freq, np.log(freq)))
-
-    bounds = math.log(2.0 * math.pi * LOW_HZ), math.log(2.0 * math.pi * HIGH_HZ)
-    return math.exp(minimize_scalar(noise, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
-
-
-def band_end(slow: SensorBelief, fast: SensorBelief, bandwidth: float) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of the `low_pass` B that makes either sensor's inverse proper.
-
-    Parameters
-    ----------
-    slow, fast : SensorBelief
-        The sensors.
-    bandwidth : float
-        Corner of B [rad/s].
-    """
-    excess = max(len(one.denominator) - _numerator(one).size for one in (slow, fast))
-    return low_pass(BAND_ORDER, bandwidth, BAND_ORDER + max(excess - 1, 0))
-
-
-def _numerator(sensor: SensorBelief) -> FloatArray:
-    return np.trim_zeros(np.array(sensor.numerator), "f")
-
-
-def inverse(sensor: SensorBelief) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of the inverse of a sensor, zeros at s = 0 left out.
-
-    Parameters
-    ----------
-    sensor : SensorBelief
-        Its belief.
-
-    Raises
-    ------
-    ValueError
-        If the inverse is unstable.
-    """
-    b = np.trim_zeros(_numerator(sensor), "b")
-    if np.any(np.roots(b).real >= 0.0):
-        msg = f"belief: expected a sensor whose inverse is stable, got the zeros {np.roots(b).tolist()} rad/s"
-        raise ValueError(msg)
-    return np.array(sensor.denominator), b
-
-
-def realised(numerator: FloatArray, denominator: FloatArray) -> Realisation:
-    """Return the modal realisation of a transfer function.
-
-    Parameters
-    ----------
-    numerator, denominator : ndarray, shapes (n_num,), (n_den,)
-        Coefficients in s, highest power first.
-    """
-    return SensorBelief(numerator=tuple(numerator), denominator=tuple(denominator)).realisation()
-
-
-def zeros_at_dc(sensor: SensorBelief) -> int:
-    """Return how many zeros a sensor has at s = 0 [-].
-
-    Parameters
-    ----------
-    sensor : SensorBelief
-        Its belief.
-    """
-    b = np.array(sensor.numerator)
-    return b.size - np.trim_zeros(b, "b").size
 
 
 class TwoPaths(BlockFilter):
@@ -364,71 +189,3 @@ def _best_bandwidth(candidate: Callable[[float], tuple[Paths, FloatArray]], samp
 
     bounds = math.log(1.0), math.log(sample_rate_hz / 4.0)
     return math.exp(minimize_scalar(error, bounds=bounds, method="bounded", options={"xatol": 1e-2}).x)
-
-
-def noise_variance(paths: Paths, model: FusionModel, slow: int, fast: int) -> FloatArray:
-    """Return the variance that the sensors' noise leaves at each step of the cycle [rad^2/s^2], shape (n_step,).
-
-    Covariance of [states of the sensors, x, fast reading, held value] with the true rate at zero, step by step over the cycle of slow
-    readings, settled by doubling.
-
-    Parameters
-    ----------
-    paths : Paths
-        The filter.
-    model : FusionModel
-        The sensors: F, Q, H, R of order 1.
-    slow, fast : int
-        Which sensor is which.
-
-    Raises
-    ------
-    ValueError
-        If the error does not settle: the loop around the slow sensor is unstable.
-    """
-    M, W, read = _joint_steps(paths, model, slow, fast)
-    around = np.linalg.multi_dot([*M[::-1], np.eye(len(read))])
-    if np.max(np.abs(np.linalg.eigvals(around))) >= 1.0:
-        msg = "crossover: expected one well inside the band of the slow sensor, got an unstable loop; give a lower one"
-        raise ValueError(msg)
-    total = np.zeros_like(around)
-    for step, noise in zip(M, W, strict=True):
-        total = step @ total @ step.T + noise
-    for _ in range(_DOUBLINGS):
-        total, around = total + around @ total @ around.T, around @ around
-    variance = []
-    for step, noise in zip(M, W, strict=True):
-        total = step @ total @ step.T + noise
-        variance.append(read @ total @ read)
-    return np.array(variance)
-
-
-def _joint_steps(
-    paths: Paths, model: FusionModel, slow: int, fast: int
-) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    """Return transition and noise of each step of the cycle, and the row that reads the error."""
-    F, Q, H = model.F[1:, 1:], model.Q[1:, 1:], model.H[:, 1:]
-    Phi, Gamma, ramp, E = paths.discrete(1.0 / model.sample_rate_hz)
-    n, m = len(F), len(Phi)
-    z, held = n + m, n + m + 1
-    move = np.eye(held + 1)
-    move[:n, :n] = F
-    move[z, :] = 0.0
-    move[z, :n] = H[fast] @ F
-    move[n:z, n:z], move[n:z, z], move[n:z, held] = Phi, Gamma - ramp, E
-    move[n:z, :n] = np.outer(ramp, H[fast] @ F)
-    # Process noise and the noise of the fast reading enter the sensors, the reading and, through its slope, the filter.
-    enter = np.zeros((held + 1, n + 1))
-    enter[:n, :n], enter[z] = np.eye(n), [*H[fast], 1.0]
-    enter[n:z] = np.outer(ramp, enter[z])
-    noise = enter @ np.block([[Q, np.zeros((n, 1))], [np.zeros((1, n)), model.R[fast]]]) @ enter.T
-    take = np.eye(held + 1)
-    take[held, :n], take[held, held] = H[slow], 0.0
-    if paths.innovate:
-        take[held, n:z], take[held, z] = -paths.H, -paths.J
-    due = take @ noise @ take.T
-    due[held, held] += model.R[slow]
-    pause = model.strides[slow] - 1
-    read = np.zeros(held + 1)
-    read[n:z], read[z] = paths.C, paths.D
-    return [take @ move, *[move] * pause], [due, *[noise] * pause], read

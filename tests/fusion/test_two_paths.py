@@ -12,7 +12,9 @@ from testbed.fusion.blending import Blending
 from testbed.fusion.complementary import Complementary
 from testbed.fusion.model import build_model
 from testbed.fusion.optimum import optimum
-from testbed.fusion.two_paths import TwoPathParameters, band_end, best_crossover, low_pass, noise_variance
+from testbed.fusion.two_path_design import band_end, best_crossover, low_pass
+from testbed.fusion.two_path_noise import noise_variance
+from testbed.fusion.two_paths import TwoPathParameters
 
 DEG = np.pi / 180.0
 RATES = {"mems_gyro": 2000.0, "mhd_ars": 20000.0}
