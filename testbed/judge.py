@@ -58,7 +58,7 @@ class Judge:
         psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
         floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
         floor_deg = None if floor is None else float(np.rad2deg(floor))
-        optimum_deg = None if floor is None else self._optimum()
+        optimum_deg, of_lines = (None, {}) if floor is None else self._optima()
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
@@ -69,6 +69,11 @@ class Judge:
             }
             for name in self._scenario.fusion
         }
+        for row in fusion.values():
+            for line in row["lines"]:
+                line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
+        from testbed.budget import budget_summary
+
         return {
             "scenario": self._scenario.name,
             "seed": frame.seed,
@@ -79,21 +84,28 @@ class Judge:
             "sensors": sensors,
             "fusion": fusion,
             "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
+            "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
         }
 
-    def _optimum(self) -> float | None:
-        """Return what the best fixed filter of this very signal leaves [deg/s]: one value for all filters, None without lines."""
+    def _optima(self) -> tuple[float | None, dict[float, float]]:
+        """Return what the best fixed filter of this very signal leaves [deg/s], and of each line alone, by frequency [Hz].
+
+        One value for all filters; None and nothing without lines.
+        """
         lines = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
         # A table that does not move has no lines in its truth, only arithmetic noise.
-        if not any(amplitude > np.deg2rad(1e-9) for _, amplitude in lines):
-            return None
-        from testbed.budget import signal_optimum
+        moving = [(freq, amplitude) for freq, amplitude in lines if amplitude > np.deg2rad(1e-9)]
+        if not moving:
+            return None, {}
+        from testbed.budget import signal_optima
 
-        best = signal_optimum(
-            self._scenario.sensors, {name: self._rates[name] for name in self._scenario.sensors}, lines
-        )
-        return None if best is None else float(np.rad2deg(best.rmse))
+        rates = {name: self._rates[name] for name in self._scenario.sensors}
+        best = signal_optima(self._scenario.sensors, rates, [lines, *([line] for line in moving)])
+        if best is None:
+            return None, {}
+        whole, *alone = (float(np.rad2deg(one.rmse)) for one in best)
+        return whole, {freq: value for (freq, _), value in zip(moving, alone, strict=True)}
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
         rows = []

@@ -91,17 +91,19 @@ class ErrorMetrics:
         if not self._n:
             return {"rmse_deg_s": None, "rmse_aligned_deg_s": None, "peak_error_deg_s": None, "lines": [], **missing}
         gains = self._gains()
+        rest = self._rest() if self._lines else 0.0
         return {
             "rmse_deg_s": _finite(np.rad2deg(np.sqrt(self._square / self._n))),
-            "rmse_aligned_deg_s": self._aligned(gains),
+            "rmse_aligned_deg_s": self._aligned(gains, rest),
             "peak_error_deg_s": _finite(np.rad2deg(self._peak)),
             "lines": [
                 {
                     "frequency_hz": line,
                     "gain": None if g is None else _finite(abs(g)),
                     "phase_deg": None if g is None else _finite(np.angle(g, deg=True)),
+                    "error_deg_s": None if g is None else _finite(np.rad2deg(_hypot(rest, a * abs(g - 1.0)))),
                 }
-                for line, (_, g) in zip(self._lines, gains, strict=True)
+                for line, (a, g) in zip(self._lines, gains, strict=True)
             ],
             **missing,
         }
@@ -130,13 +132,22 @@ class ErrorMetrics:
         # A line that is not in the truth (a fixed table) has no gain: below 1e-9 deg/s it is arithmetic noise.
         return [(abs(c), 1.0 + e / c if abs(c) > np.deg2rad(1e-9) else None) for c, e in zip(truth, error, strict=True)]
 
-    def _aligned(self, gains: list[tuple[float, complex | None]]) -> float | None:
-        if not gains or any(g is None for _, g in gains):
-            return None
+    def _rest(self) -> float:
+        """Return the mean square of the error once the lines are fitted out [rad^2/s^2]."""
         fit, *_ = np.linalg.lstsq(self._gram, self._with_error, rcond=None)
         rest = (self._square - 2.0 * fit @ self._with_error + fit @ self._gram @ fit) / self._n
+        return max(float(rest), 0.0)
+
+    def _aligned(self, gains: list[tuple[float, complex | None]], rest: float) -> float | None:
+        if not gains or any(g is None for _, g in gains):
+            return None
         lines = sum(a**2 * (abs(g) - 1.0) ** 2 / 2.0 for a, g in gains if g is not None)
-        return _finite(np.rad2deg(np.sqrt(max(float(rest), 0.0) + lines)))
+        return _finite(np.rad2deg(np.sqrt(rest + lines)))
+
+
+def _hypot(rest: float, amplitude: float) -> float:
+    """Return the rms of a sine and something else of the mean square `rest`."""
+    return float(np.sqrt(rest + 0.5 * amplitude**2))
 
 
 def _phasors(gram: FloatArray, projection: FloatArray) -> list[complex]:

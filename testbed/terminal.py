@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _PLAIN_EVERY = 5.0
 # A tenth of the Earth's rate [deg/s].
 _SLOW = 1.5 / 3600.0
-# Columns of the terminal: errors of a filter, and gain and phase of one line.
-_TABLE_WIDTH, _LINE_WIDTH = 70, 23
+# Columns of the terminal: errors of a filter, and gain, phase and error over optimum of one line.
+_TABLE_WIDTH, _LINE_WIDTH = 70, 31
 
 
 @contextmanager
@@ -104,7 +104,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         "claimed std",
         "x floor",
         "x optimum",
-        *(f"{line:g} Hz gain, phase" for line in shown),
+        *(f"{line:g} Hz gain, phase, x opt." for line in shown),
     )
     rows = {
         kind: [_row(name, row, shown, scale) for name, row in metrics[kind].items()] for kind in ("sensors", "fusion")
@@ -115,6 +115,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     for name, row in metrics["sensors"].items():
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
+    _print_budget(console, metrics["budget"])
     _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
@@ -183,8 +184,31 @@ def _row(name: str, row: Mapping[str, Any], shown: list[float], scale: float) ->
     cells += ["-" if not bound or rmse is None else f"{rmse / bound:.1f}" for bound in bounds]
     for line in shown:
         entry = gains[line]
-        cells.append("-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg")
+        cells.append(
+            "-" if entry["gain"] is None else f"{entry['gain']:.4f}, {entry['phase_deg']:+.2f} deg{_over(entry)}"
+        )
     return cells
+
+
+def _over(line: Mapping[str, Any]) -> str:
+    """Return the error of a line over its optimum, in a cell."""
+    return f", {line['error_deg_s'] / line['optimum_deg_s']:.1f}" if line.get("optimum_deg_s") else ""
+
+
+def _print_budget(console: Console, budget: Mapping[str, Any] | None) -> None:
+    """Print in one line which sensor makes the noise floor, and where the better sensor changes."""
+    if budget is None:
+        return
+    parts = []
+    for name in budget["densities"]:
+        variance = [band["sensors_deg_s"][name] ** 2 for band in budget["bands"]]
+        most = budget["bands"][variance.index(max(variance))]
+        parts.append(
+            f"{name} {_number(math.sqrt(sum(variance)))} deg/s (most at {most['low_hz']:g}-{most['high_hz']:g} Hz)"
+        )
+    crossed = ", ".join(_number(freq) for freq in budget["crossovers_hz"])
+    where = f"crossover {crossed} Hz; " if crossed else ""
+    console.print(f"noise floor: {where}{', '.join(parts)}", soft_wrap=True, highlight=False)
 
 
 def print_scenario(scenario: Scenario, facts: TableFacts) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.budget import believed, crossovers, noise_budget, signal_optimum
+from testbed.budget import believed, budget_summary, crossovers, noise_budget, signal_optima, signal_optimum
 from testbed.metrics import floor_density, floor_rmse
 from testbed.sensors import load_preset
 
@@ -39,6 +39,53 @@ def test_budget_adds_up_to_the_floor():
     # `floor_rmse` takes the density as constant below 1e-6 Hz; both by trapezoids of at least 200 points per decade.
     total += 2.0 * 1e-6 * floor_density(list(psds.values()), np.array([1e-6]))[0]
     assert np.sqrt(total) == pytest.approx(floor_rmse(list(psds.values()), 1000.0), rel=1e-3)
+
+
+@pytest.mark.oracle
+def test_summary_of_a_white_gyro_and_a_high_pass():
+    """S_g = N^2, S_m = (a / f)^2: weights f_x^2 / (f^2 + f_x^2) and the rest, crossover f_x = a / N, all bands in closed form."""
+    N, crossing = 1e-5, 0.05
+    psds = {
+        "gyro": lambda f: np.full(f.shape, N**2),
+        "mhd": lambda f: (N * crossing / f) ** 2,
+    }
+    found = budget_summary(psds, 300.0)
+    assert found["crossovers_hz"] == pytest.approx([crossing], rel=1e-4)
+    assert [band["low_hz"] for band in found["bands"]] == [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0]
+    assert found["bands"][-1]["high_hz"] == 300.0
+
+    # With x = f / f_x: 2 N^2 / (1 + x^2)^2 and 2 N^2 x^2 / (1 + x^2)^2, whose integrals are (atan x +- x / (1 + x^2)) / 2.
+    def leaves(f, sign):
+        x = f / crossing
+        return N**2 * crossing * (np.arctan(x) + sign * x / (1.0 + x**2))
+
+    for band in found["bands"]:
+        for name, sign in (("gyro", 1.0), ("mhd", -1.0)):
+            variance = leaves(band["high_hz"], sign) - leaves(band["low_hz"], sign)
+            # The first band is integrated from 1e-6 Hz: 1e-3 of its variance; above f_x the closed form cancels.
+            wanted = pytest.approx(np.rad2deg(np.sqrt(variance)), rel=2e-3, abs=1e-12)
+            assert band["sensors_deg_s"][name] == wanted
+        whole = np.sqrt(sum(value**2 for value in band["sensors_deg_s"].values()))
+        assert band["floor_deg_s"] == pytest.approx(whole, rel=1e-12)
+    at = np.array(found["frequency_hz"])
+    assert found["densities"]["mhd"] == pytest.approx(np.rad2deg(N * crossing / at), rel=1e-12)
+
+
+def test_a_crossing_above_a_better_third_sensor_is_none():
+    psds = {
+        "a": lambda f: 1.0 + f**2,
+        "b": lambda f: 2.0 + 0.0 * f,
+        "best": lambda f: 0.1 + 0.0 * f,
+    }
+    assert budget_summary(psds, 100.0)["crossovers_hz"] == []
+    del psds["best"]
+    assert budget_summary(psds, 100.0)["crossovers_hz"] == pytest.approx([1.0], rel=1e-4)
+
+
+def test_optimum_of_each_line_alone_is_below_that_of_both():
+    lines = [(0.5, DEG), (100.0, DEG)]
+    both, slow, fast = signal_optima(SENSORS, RATES, [lines, *([line] for line in lines)])
+    assert slow.rmse < fast.rmse < both.rmse
 
 
 @pytest.mark.parametrize("edges", [[1.0], [0.0, 1.0], [2.0, 1.0]])

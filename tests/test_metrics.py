@@ -34,6 +34,8 @@ def test_rmse_includes_the_phase():
             "frequency_hz": 10.0,
             "gain": pytest.approx(1.0, abs=1e-12),
             "phase_deg": pytest.approx(np.rad2deg(phi), abs=1e-10),
+            # One line and nothing else: all of the error.
+            "error_deg_s": pytest.approx(np.rad2deg(np.sqrt(1 - np.cos(phi))), rel=1e-9),
         }
     ]
     assert result["peak_error_deg_s"] == pytest.approx(np.rad2deg(2 * np.sin(phi / 2)), rel=1e-3)
@@ -53,6 +55,19 @@ def test_aligned_keeps_gain_error_noise_and_offset(rng):
     assert_allclose([p for _, p in gains], np.rad2deg([0.2, -0.1]), atol=np.rad2deg(2.8e-3))
 
 
+def test_error_of_a_line_is_its_own_and_what_is_on_no_line(rng):
+    """sqrt(A^2 |g - 1|^2 / 2 + offset^2 + noise^2): the other line does not count."""
+    noise = 0.01 * rng.standard_normal(T.size)
+    estimate = tone(1.02, 0.5) + tone(0.18, 10.0, 0.1) + 0.003 + noise
+    result = judged(estimate, tone(1.0, 0.5) + tone(0.18, 10.0), (0.5, 10.0)).result()
+    rest = 0.003**2 + 0.01**2
+    late = 0.18**2 * (1.0 - np.cos(0.1))
+    found = np.deg2rad([line["error_deg_s"] for line in result["lines"]])
+    # 4 sigma of the noise power, sqrt(2/n), and of the fitted amplitudes, 1e-4 each, against errors of 0.014 and 0.013.
+    assert_allclose(found, np.sqrt([0.02**2 / 2 + rest, late + rest]), rtol=4 * 0.01)
+    assert np.hypot(*found) ** 2 - rest == pytest.approx(np.deg2rad(result["rmse_deg_s"]) ** 2, rel=0.05)
+
+
 def test_lines_are_separated_also_over_broken_periods():
     t = np.arange(3_333) / FS
     truth = tone(1.0, 0.5, t=t) + tone(0.2, 10.0, t=t)
@@ -69,7 +84,7 @@ def test_without_lines_aligned_is_undefined():
 
 def test_a_line_that_is_not_in_the_truth_has_no_gain():
     result = judged(tone(1.0, 5.0), np.zeros(T.size), (5.0,)).result()
-    assert result["lines"] == [{"frequency_hz": 5.0, "gain": None, "phase_deg": None}]
+    assert result["lines"] == [{"frequency_hz": 5.0, "gain": None, "phase_deg": None, "error_deg_s": None}]
     assert result["rmse_aligned_deg_s"] is None
 
 

@@ -70,11 +70,12 @@ def test_metrics_json_has_the_documented_form_and_no_nan(stored):
         "versions",
         "sensors",
         "fusion",
+        "budget",
         "expectations",
     } <= metrics.keys()
     for entry in metrics["fusion"].values():
         assert {"rmse_deg_s", "rmse_aligned_deg_s", "floor_rmse_deg_s", "optimum_rmse_deg_s", "lines"} <= entry.keys()
-        assert entry["lines"][0].keys() == {"frequency_hz", "gain", "phase_deg"}
+        assert entry["lines"][0].keys() == {"frequency_hz", "gain", "phase_deg", "error_deg_s", "optimum_deg_s"}
     assert 0.0 < metrics["fusion"]["kalman"]["optimum_rmse_deg_s"] < metrics["fusion"]["kalman"]["rmse_deg_s"]
 
 

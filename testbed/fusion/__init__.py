@@ -22,6 +22,8 @@ FILTERS = {
     "arw_shakf": "testbed.fusion.arw_shakf:ArwShakf",
     "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
     "steady_state": "testbed.fusion.steady_state:SteadyState",
+    "complementary": "testbed.fusion.complementary:Complementary",
+    "blending": "testbed.fusion.blending:Blending",
     "wideband": "testbed.fusion.wideband:Wideband",
     "allan_srkf": "testbed.fusion.allan_srkf:AllanSrkf",
 }

@@ -297,23 +297,55 @@ def optimum(
     Optimum
         The best filter and its error.
     """
-    freq = np.array([line for line, _ in lines])
-    power = np.array([0.5 * amplitude**2 for _, amplitude in lines])
+    return optima(belief, sample_rate_hz, [lines], excess=excess, orders=orders)[0]
+
+
+def optima(
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    signals: Sequence[Sequence[tuple[float, float]]],
+    *,
+    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
+    orders: Sequence[int] = (1, 2, 3),
+) -> list[Optimum]:
+    """Return the `optimum` of each signal; the Riccati equations are solved once for all.
+
+    Parameters
+    ----------
+    belief, sample_rate_hz, excess, orders : mapping, mapping, mapping, sequence
+        As for `optimum`.
+    signals : sequence of sequence of (float, float)
+        Lines of each signal: frequency [Hz] and amplitude [rad/s].
+    """
+    freq = np.array([line for lines in signals for line, _ in lines])
+    power = np.array([0.5 * amplitude**2 for lines in signals for _, amplitude in lines])
+    of_signal = np.repeat(np.eye(len(signals)), [len(lines) for lines in signals], axis=0)
     truth = np.array([belief[name].realisation().response(freq) for name in sample_rate_hz])
-    best: Optimum | None = None
+    best: list[Optimum | None] = [None] * len(signals)
     for order in orders:
         low, high = DECADES[order]
         filters = settled_filters(belief, sample_rate_hz, order=order, q=np.logspace(low, high, high - low + 1))
         shares = filters.noise_variance() + filters.coloured_variance(
             [(excess or {}).get(name) for name in sample_rate_hz]
         )
-        noise, lag = shares.sum(axis=0), filters.line_error(freq, truth) ** 2 @ power
-        i = int(np.argmin(noise + lag))
-        rmse = float(np.sqrt(noise[i] + lag[i]))
-        if best is None or rmse < best.rmse:
-            by_sensor = dict(zip(filters.model.sensors, np.sqrt(shares[:, i]).tolist(), strict=True))
-            best = Optimum(
-                rmse, float(np.sqrt(noise[i])), float(np.sqrt(lag[i])), order, float(filters.q[i]), by_sensor
-            )
-    assert best is not None
-    return best
+        lags = filters.line_error(freq, truth) ** 2 * power @ of_signal
+        for k, lag in enumerate(lags.T):
+            found = _least(filters, order, shares, lag)
+            known = best[k]
+            if known is None or found.rmse < known.rmse:
+                best[k] = found
+    return [one for one in best if one is not None]
+
+
+def _least(filters: FixedFilters, order: int, shares: FloatArray, lag: FloatArray) -> Optimum:
+    """Return the best of the filters, given the noise variance by sensor and the lag power of each [rad^2/s^2]."""
+    noise = shares.sum(axis=0)
+    i = int(np.argmin(noise + lag))
+    return Optimum(
+        rmse=float(np.sqrt(noise[i] + lag[i])),
+        noise=float(np.sqrt(noise[i])),
+        lag=float(np.sqrt(lag[i])),
+        order=order,
+        q=float(filters.q[i]),
+        shares=dict(zip(filters.model.sensors, np.sqrt(shares[:, i]).tolist(), strict=True)),
+    )

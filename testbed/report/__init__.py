@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from testbed.errors import Problem, ScenarioError
 from testbed.palette import series_colors
+from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
@@ -63,7 +64,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
-    environment.globals |= {"ratio_to_floor": ratio_to_floor, "honesty": honesty}
+    environment.globals |= {"ratio_to_floor": ratio_to_floor, "honesty": honesty, "line_error": line_error}
     return environment.get_template("report.html.j2").render(
         metrics=metrics,
         names=_shown_metrics(metrics),
@@ -72,6 +73,8 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         summary=summary(metrics, digest),
         scenario=scenario,
         digest=digest,
+        bands=band_rows(metrics.budget, digest) if metrics.budget else [],
+        line_optima=line_optima(metrics),
         figures=_figures(metrics, digest),
     )
 
@@ -103,5 +106,7 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Markup]:
     drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors)
+    if metrics.budget is not None:
+        drawn["budget"] = budget_figure(metrics.budget, colors)
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
     return {name: Markup(svg_text(figure, name)) for name, figure in drawn.items()}

@@ -38,7 +38,8 @@ class ErrorTrace:
     """An error against the truth [rad/s].
 
     `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error| <= 2 std; None for a sensor.
-    `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short.
+    `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short; `band_rms` the error
+    [rad/s] in each band of the noise budget, None where the spectrum does not reach.
     """
 
     whole: Envelope
@@ -47,6 +48,7 @@ class ErrorTrace:
     freq_hz: FloatArray
     density: FloatArray
     n_segments: int
+    band_rms: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
         rates[group] = trace
     errors = {}
     for group in [f"sensors/{name}" for name in metrics.sensors] + [f"fusion/{name}" for name in metrics.fusion]:
-        rates[group], errors[group] = _follow(data, group, truth, metrics.settle_s, zoom)
+        rates[group], errors[group] = _follow(data, group, truth, metrics, zoom)
     return Digest(
         duration_s=metrics.duration_s,
         settle_s=metrics.settle_s,
@@ -146,13 +148,13 @@ def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
 
 
 def _follow(
-    data: RunData, group: str, truth: Signal, settle_s: float, zoom: tuple[float, float]
+    data: RunData, group: str, truth: Signal, metrics: RunMetrics, zoom: tuple[float, float]
 ) -> tuple[RateTrace, ErrorTrace]:
     """Read one sensor or filter beside the truth."""
     signal = data.signal(group, "rate")
     std = data.signal(group, "std") if group.startswith("fusion/") else None
     stride, fs = data.stride(group, signal, truth), signal.sample_rate_hz
-    settle = min(int(np.ceil(settle_s * fs - 1e-6)), signal.n_time)
+    settle = min(int(np.ceil(metrics.settle_s * fs - 1e-6)), signal.n_time)
     n_segment = segment_length(signal.n_time - settle)
     welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
     trace = _rate_trace(signal, zoom)
@@ -181,6 +183,7 @@ def _follow(
         freq_hz=freq_hz,
         density=density,
         n_segments=0 if welch is None else welch.n_segments,
+        band_rms=_band_rms(welch, metrics),
     )
 
 
@@ -201,6 +204,18 @@ def _count_inside(error: FloatArray, sigma: FloatArray) -> tuple[int, int]:
     judged = np.isfinite(error) & np.isfinite(sigma)
     inside = np.abs(error[judged]) <= 2.0 * sigma[judged]
     return int(np.count_nonzero(inside)), int(np.count_nonzero(judged))
+
+
+def _band_rms(welch: WelchDensity | None, metrics: RunMetrics) -> tuple[float | None, ...]:
+    """Return the root mean square in each band of the noise budget; None for a band that the spectrum covers in part only."""
+    found: list[float | None] = []
+    for band in metrics.budget.bands if metrics.budget else []:
+        if welch is None or welch.n_segments == 0 or band.low_hz < welch.freq_hz[FIRST_FREQ]:
+            found.append(None)
+        else:
+            inside = (welch.freq_hz >= band.low_hz) & (welch.freq_hz < band.high_hz)
+            found.append(float(np.sqrt(2.0 * welch.density[inside].sum() * welch.freq_hz[1])))
+    return tuple(found)
 
 
 def _plotted(welch: WelchDensity | None) -> tuple[FloatArray, FloatArray]:

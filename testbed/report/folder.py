@@ -30,6 +30,8 @@ class LineMetrics(_Metrics):
     frequency_hz: float
     gain: float | None = None
     phase_deg: float | None = None
+    error_deg_s: float | None = None
+    optimum_deg_s: float | None = None
 
 
 class SourceMetrics(_Metrics):
@@ -62,6 +64,32 @@ class FloorDensity(_Metrics):
     density: list[float]
 
 
+class Band(_Metrics):
+    """What each sensor, and all together, leave in the best combination between two frequencies [deg/s]."""
+
+    low_hz: float
+    high_hz: float
+    floor_deg_s: float
+    sensors_deg_s: dict[str, float]
+
+
+class Budget(_Metrics):
+    """Crossovers [Hz], bands, and root densities of the sensors' noise [deg/s/sqrt(Hz)] against frequency [Hz]."""
+
+    crossovers_hz: list[float]
+    bands: list[Band]
+    frequency_hz: list[float]
+    densities: dict[str, list[float | None]]
+
+    def combined(self) -> FloatArray:
+        """Return the root density of the best combination [deg/s/sqrt(Hz)], shape (n_freq,)."""
+        information = np.zeros(len(self.frequency_hz))
+        for density in self.densities.values():
+            information += [0.0 if one is None else one**-2 for one in density]
+        with np.errstate(divide="ignore"):
+            return np.asarray(information**-0.5)
+
+
 class RunMetrics(_Metrics):
     """Content of ``metrics.json``."""
 
@@ -76,6 +104,7 @@ class RunMetrics(_Metrics):
     turntable: SourceMetrics | None = None
     expectations: list[Expectation] = []
     floor_density: FloorDensity | None = None
+    budget: Budget | None = None
 
     @property
     def line_freq_hz(self) -> list[float]:
