@@ -88,7 +88,7 @@ def test_single_precision_is_single_throughout(form: int) -> None:
     Z = random_stream(3, "single").standard_normal((1, 200))
     out = np.empty((4, 200))
     x, P = np.float32(0.0), np.float32(7.0)
-    kalman_kernel(1, 1, form)(x * one[0], P * one, one, one, one, R * one[0], Z, False, out)
+    kalman_kernel(1, 1, form)(x * one[0], P * one, one, one, one, R * one[0], Z, np.zeros(1, dtype=int), False, out)
     for k, z in enumerate(Z[0].astype(np.float32)):
         P = P + np.float32(k > 0)
         K, e = P / (R + P), z - x
