@@ -112,6 +112,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
     for name, row in metrics["sensors"].items():
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
+    _print_claims(console, metrics["fusion"])
     _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
@@ -119,6 +120,17 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
             f"expected {bound['subject']} {bound['metric']} {bound['bound']}: {_number(bound['value'])} {verdict}"
         )
     console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+
+
+def _print_claims(console: Console, fusion: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print the verdict on each filter's claims about itself."""
+    words = [
+        f"{name} {row['consistency']['verdict']} (NEES {_number(row['consistency']['nees'])})"
+        for name, row in fusion.items()
+        if row["consistency"]["verdict"] is not None
+    ]
+    if words:
+        console.print(f"claims: {', '.join(words)}", soft_wrap=True, highlight=False)
 
 
 def _print_table(console: Console, table: Mapping[str, Any]) -> None:
