@@ -90,9 +90,7 @@ class Consistency:
         self._square = 0.0
         self._sensors: dict[str, Whiteness] = {}
 
-    def add(
-        self, error: FloatArray, std: FloatArray, diagnostics: Mapping[str, FloatArray], start: int = 0
-    ) -> None:
+    def add(self, error: FloatArray, std: FloatArray, diagnostics: Mapping[str, FloatArray], start: int = 0) -> None:
         """Add a block.
 
         Parameters

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
+from typer.testing import CliRunner
 
+import testbed
+from testbed.cli import app
 from testbed.consistency import LAGS, MISS, Consistency, Whiteness
 from testbed.signals import random_stream
+from tests.scenes import short, short_file
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from testbed.signals import FloatArray
 
 
 def found(error: float, std: float, innovation: FloatArray, variance: float) -> dict[str, Any]:
     """Return what is said of a constant error and of innovations of one sensor."""
     one = Consistency()
-    diagnostics = {"innovation_a": innovation, "innovation_variance_a": np.full(innovation.size, variance), "band_a": innovation}
+    diagnostics = {
+        "innovation_a": innovation,
+        "innovation_variance_a": np.full(innovation.size, variance),
+        "band_a": innovation,
+    }
     one.add(np.full(innovation.size, error), np.full(innovation.size, std), diagnostics)
     return one.result()
 
@@ -70,7 +81,9 @@ def test_any_division_into_blocks_gives_the_same_values(size: int) -> None:
         parts.add(error[cut], std[cut], {"innovation_a": e[cut], "innovation_variance_a": np.ones(4000)[cut]})
     for key, value in whole.result().items():
         # Sums in another order: 4000 roundings.
-        assert parts.result()[key] == (value if value is None or isinstance(value, str) else pytest.approx(value, rel=1e-9, abs=1e-12))
+        assert parts.result()[key] == (
+            value if value is None or isinstance(value, str) else pytest.approx(value, rel=1e-9, abs=1e-12)
+        )
 
 
 @pytest.mark.parametrize(
@@ -95,3 +108,29 @@ def test_what_is_undefined_is_null() -> None:
     assert silent["verdict"] == "consistent"
     # A claim of no error at all, and its error: JSON has no infinity.
     json.dumps(found(1.0, 0.0, white(), 0.0), allow_nan=False)
+
+
+def test_a_run_states_the_verdict_in_metrics_report_and_terminal(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["run", str(short_file(tmp_path)), "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0
+    fusion = json.loads((tmp_path / "run" / "metrics.json").read_text())["fusion"]
+    page = (tmp_path / "run" / "report.html").read_text()
+    for name in ("kalman", "arw_shakf"):
+        claims = fusion[name]["consistency"]
+        assert {"nees", "nis_mhd_ars", "nis_mems_gyro", "whiteness_mhd_ars", "whiteness_mems_gyro"} < set(claims)
+        assert re.search(rf"{name} {claims['verdict']} \(NEES", done.output)
+        row = page.split(f'<tr data-kind="claims" data-name="{name}">')[1].split("</tr>")[0]
+        assert claims["verdict"] in row
+        assert f'value="{claims["nees"]}"' in row
+        assert f'value="{claims["nis_mhd_ars"]}"' in row
+
+
+def test_a_run_judges_what_comes_after_settle_in_any_blocks(tmp_path: Path) -> None:
+    run, parts = testbed.run(short(tmp_path)), testbed.run(short(tmp_path), block=0.013)
+    claims = run.metrics["fusion"]["kalman"]["consistency"]
+    error, std = run.fusion["kalman"].rate - run.truth.rate, run.fusion["kalman"].std
+    assert claims["nees"] == pytest.approx(np.mean((error / std)[4000:] ** 2), rel=1e-9)
+    e, C = (run.fusion["kalman"][f"{key}_mems_gyro"] for key in ("innovation", "innovation_variance"))
+    assert claims["nis_mems_gyro"] == pytest.approx(np.nanmean((e**2 / C)[4000:]), rel=1e-9)
+    for key, value in parts.metrics["fusion"]["kalman"]["consistency"].items():
+        assert value == (claims[key] if isinstance(value, str) else pytest.approx(claims[key], rel=1e-9))

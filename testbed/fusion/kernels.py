@@ -331,7 +331,7 @@ def row_square(D, j, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
+def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
 
     x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is (n_sensor, n_time);
@@ -340,7 +340,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912  # pragma: no cover
         # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
@@ -412,7 +412,7 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # pragma: no cover
         x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H = np.empty((n_sensor, n))

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.contract
 
 @functools.cache
 def readings():
-    """Readings of the sensors of equation (39), with their white noise, for 1 deg/s at 1 Hz."""
+    """Return the rate and the readings of the sensors of equation (39), with their white noise, for 1 deg/s at 1 Hz."""
     t = np.arange(round(LENGTH * 20_000)) / 20_000
     rate = AMPLITUDE * np.sin(2.0 * np.pi * t)
     fast, slow = (random_stream(1, name).standard_normal(t.size) * np.sqrt(20_000) for name in RATES)
@@ -134,6 +134,17 @@ def test_a_single_bad_reading_is_forgotten(name, fault, sensor):
     after = slice(round((BEGIN + 10.0 / MHD_CORNER) * 20_000), None)
     error, usual = (np.sqrt(np.mean((one.rate - rate)[after] ** 2)) for one in (block, clean))
     assert error <= REMEMBERS.get(name, 1.1) * usual
+
+
+@pytest.mark.slow
+def test_shakf_falls_back_from_a_railed_sensor_within_a_minute(monkeypatch):
+    """Why it is said to fall back at all: 10 deg/s of trace are gone after 50 s."""
+    readings.cache_clear()
+    monkeypatch.setitem(globals(), "LENGTH", 50.0)
+    block, _ = estimate_with(railed, "shakf", "mhd_ars")
+    rate = readings()[0]
+    readings.cache_clear()
+    assert np.abs(block.rate - rate)[-20_000:].max() < 0.1 * AMPLITUDE
 
 
 @pytest.mark.parametrize("sensor", RATES)

@@ -86,7 +86,10 @@ def simulate(model: Any, R: FloatArray, P0: FloatArray, seed: int) -> tuple[Floa
 @functools.cache
 def monte_carlo(name: str) -> Found:
     stage = built(name)
-    if not any(key.startswith("innovation_variance_") for key in stage.process({"mems_gyro": [0.0], "mhd_ars": [0.0]}).diagnostics):
+    if not any(
+        key.startswith("innovation_variance_")
+        for key in stage.process({"mems_gyro": [0.0], "mhd_ars": [0.0]}).diagnostics
+    ):
         pytest.skip(f"{name} reports no innovations")
     rate, z = simulate(*truth_model(name, stage), seed=4)
     nees, innovations = np.empty((RUNS, len(INSTANTS))), {sensor: [] for sensor in RATES}
@@ -94,7 +97,9 @@ def monte_carlo(name: str) -> Found:
         block = built(name).process({"mems_gyro": z[run, 0, ::10], "mhd_ars": z[run, 1]})
         nees[run] = ((block.rate - rate[run]) / block.std)[list(INSTANTS)] ** 2
         for sensor, pieces in innovations.items():
-            e, C = (block.diagnostics[f"{key}_{sensor}"][N_TIME // 3 :] for key in ("innovation", "innovation_variance"))
+            e, C = (
+                block.diagnostics[f"{key}_{sensor}"][N_TIME // 3 :] for key in ("innovation", "innovation_variance")
+            )
             pieces.append((e / np.sqrt(C))[np.isfinite(e)])
     return Found(nees, {sensor: np.concatenate(pieces) for sensor, pieces in innovations.items()})
 
