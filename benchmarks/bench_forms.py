@@ -42,7 +42,9 @@ def setting() -> None:
     model = Kalman(load_belief("paper2"), RATES, KalmanParameters()).model
     print("belief paper2, modal realisation (states are parts of the reading), Van Loan, both sensors at 20 kHz")
     print(f"P0 = diag({', '.join(f'{value / DEG**2:.2g}' for value in np.diag(model.P0))}) (deg/s)^2 for order 1")
-    print(f"R = {', '.join(f'{name} {value / DEG**2:.2g}' for name, value in zip(model.sensors, model.R, strict=True))} (deg/s)^2")
+    print(
+        f"R = {', '.join(f'{name} {value / DEG**2:.2g}' for name, value in zip(model.sensors, model.R, strict=True))} (deg/s)^2"
+    )
 
 
 def compare(label: str, n_time: int, **parameters: float) -> None:
