@@ -108,7 +108,8 @@ def mhd_response(freq_hz: FloatArray) -> ComplexArray:
 def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, stage: AllanSrkf) -> list[float]:
     """Return the amplitude of each channel for a sine.
 
-    Two periods and more are weighted by Hann's window, so that slow noise, which the fused rate has, does not leak into the line.
+    Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise referred to the rate
+    does, and what leaks of a drift into the k-th line falls as k^-5 then.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
     n_time = first + round(periods / freq_hz * CLOCK_HZ)
     turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / CLOCK_HZ
     signals = read(amplitude * DEG * np.sin(turns), seed, stage)
-    window = 1.0 - np.cos(turns[first:] / periods) if periods > 1.0 else 1.0
+    window = (1.0 - np.cos(turns[first:] / periods)) ** 2 / 1.5 if periods >= 3.0 else 1.0
     line = window * np.exp(-1j * turns[first:])
     return [float(2.0 * np.abs(np.mean(signals[name][first:] * line)) / DEG) for name in CHANNELS]
 
