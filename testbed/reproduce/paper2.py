@@ -58,7 +58,7 @@ class Protocol:
     linear_frequencies: tuple[float, ...] = (0.2, 2.0, 20.0, 50.0)
     settle: float = 1.0
     observe: float = 1.0
-    linear_observe: float = 4.0
+    linear_observe: float = 10.0
     warm_up: float = 300.0
     standstill: float = 120.0
 
