@@ -37,6 +37,16 @@ def scaled(P: FloatArray, by: FloatArray) -> FloatArray:
     return value
 
 
+def setting() -> None:
+    """Print realisation, P0 and R of the comparison: what rounding does depends on them."""
+    model = Kalman(load_belief("paper2"), RATES, KalmanParameters()).model
+    print("belief paper2, modal realisation (states are parts of the reading), Van Loan, both sensors at 20 kHz")
+    print(f"P0 = diag({', '.join(f'{value / DEG**2:.2g}' for value in np.diag(model.P0))}) (deg/s)^2 for order 1")
+    print(
+        f"R = {', '.join(f'{name} {value / DEG**2:.2g}' for name, value in zip(model.sensors, model.R, strict=True))} (deg/s)^2"
+    )
+
+
 def compare(label: str, n_time: int, **parameters: float) -> None:
     """Print one line per form and precision against Joseph in double precision."""
     reference, covariances = run("joseph", "double", n_time, **parameters)
@@ -86,6 +96,7 @@ def main() -> None:
     parser.add_argument("--long", type=float, default=3600.0, help="length of the long run of the root")
     arguments = parser.parse_args()
     n_time = round(arguments.seconds * 20000.0)
+    setting()
     compare("order 1, q = 0.3 (deg/s)^2/s", n_time)
     compare("order 3, q = 1e10 (deg/s)^2/s^5", n_time, order=3)
     hour(arguments.long)

@@ -84,7 +84,7 @@ def main() -> None:
     kernel = kalman_kernel(5, 2)
 
     def ours() -> None:
-        kernel(np.zeros(5), model.P0.copy(), model.F, model.Q, model.H, model.R, Z, False, out)
+        kernel(np.zeros(5), model.P0.copy(), model.F, model.Q, model.H, model.R, Z, np.zeros(2, dtype=int), False, out)
 
     ours()
     ours_us = best(ours, 9) / n * 1e6

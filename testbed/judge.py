@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.consistency import Consistency
 from testbed.metrics import ErrorMetrics, floor_density, floor_rmse
 from testbed.results import first_due
 from testbed.table_facts import TableMetrics
@@ -34,6 +35,7 @@ class Judge:
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
         self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
         self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        self._consistency = {name: Consistency() for name in scenario.fusion}
         self._table = TableMetrics(scenario, chain.step)
 
     def write(self, block: RunBlock) -> None:
@@ -42,15 +44,18 @@ class Judge:
         for name, readings in block.sensors.items():
             self._add(name, block, readings, None)
         for name, estimate in block.fusion.items():
-            self._add(name, block, estimate.rate, estimate.std)
+            error, settled = self._add(name, block, estimate.rate, estimate.std)
+            self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
 
-    def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> None:
+    def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> tuple[Any, int]:
+        """Add a block of readings or estimates; return the error after `settle`, and at which sample of the block that begins."""
         ratio = round(self._rates["base"] / self._rates[name])
         first = first_due(block.start, self._rates["base"], self._rates[name])
         truth = block.truth.rate[first * ratio - block.start :: ratio]
         settled = max(-(-round(self._scenario.frame.settle * self._rates["base"]) // ratio) - first, 0)
         t = np.arange(first, first + rate.size)[settled:] / self._rates[name]
         self._errors[name].add(t, rate[settled:], truth[settled:], None if std is None else std[settled:])
+        return rate[settled:] - truth[settled:], settled
 
     def metrics(self) -> dict[str, Any]:
         """Return the content of metrics.json."""
@@ -66,6 +71,7 @@ class Judge:
                 **self._errors[name].consistency(),
                 "floor_rmse_deg_s": floor_deg,
                 "optimum_rmse_deg_s": optimum_deg,
+                "consistency": self._consistency[name].result(),
             }
             for name in self._scenario.fusion
         }

@@ -116,6 +116,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
     _print_budget(console, metrics["budget"])
+    _print_claims(console, metrics["fusion"])
     _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
         verdict = "[green]met[/green]" if bound["met"] else "[red]MISSED[/red]"
@@ -143,6 +144,17 @@ def _error_unit(metrics: Mapping[str, Any]) -> tuple[str, float]:
     errors = [row["rmse_deg_s"] for kind in ("sensors", "fusion") for row in metrics[kind].values()]
     known = [error for error in errors if error is not None]
     return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
+
+
+def _print_claims(console: Console, fusion: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print the verdict on each filter's claims about itself."""
+    words = [
+        f"{name} {row['consistency']['verdict']} (NEES {_number(row['consistency']['nees'])})"
+        for name, row in fusion.items()
+        if row["consistency"]["verdict"] is not None
+    ]
+    if words:
+        console.print(f"claims: {', '.join(words)}", soft_wrap=True, highlight=False)
 
 
 def _print_table(console: Console, table: Mapping[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.kernels import CONVENTIONAL, JOSEPH, SQUARE_ROOT
+from testbed.fusion.kernels import CONVENTIONAL, JOSEPH, LARGEST_RATE, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.parts import Part
 from testbed.units import Quantity
@@ -208,7 +208,7 @@ class BlockFilter:
             raise ValueError(msg)
 
     def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is missing.
+        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is missing or no rate.
 
         Parameters
         ----------
@@ -239,6 +239,6 @@ class BlockFilter:
                     f"got shape {values.shape}"
                 )
                 raise ValueError(msg)
-            due[:] = np.where(np.isfinite(values), values, np.inf)
+            due[:] = np.where(np.abs(values) <= LARGEST_RATE, values, np.inf)
         self._sample += n_time
         return Z

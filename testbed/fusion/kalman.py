@@ -70,6 +70,7 @@ class Kalman(BlockFilter):
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
         self._R = self.measurement_noise("R", parameters.R, explicit=True).astype(self._x.dtype)
+        self._outside = np.zeros(self._R.size, dtype=np.int64)
         self._started = False
         self._run = kalman_kernel(self._x.size, self._R.size, self._form)
 
@@ -93,7 +94,8 @@ class Kalman(BlockFilter):
         """
         Z = self.spread(readings)
         out = np.empty((HEADER_ROWS + INNOVATION_ROWS * len(Z), Z.shape[1]))
-        self._started = self._run(self._x, self._P, self._F, self._Q, self._H, self._R, Z, self._started, out)
+        progress = (self._outside, self._started)
+        self._started = self._run(self._x, self._P, self._F, self._Q, self._H, self._R, Z, *progress, out)
         diagnostics = {}
         for i, name in enumerate(self.model.sensors):
             row = HEADER_ROWS + INNOVATION_ROWS * i

@@ -31,8 +31,11 @@ INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
 # Rows of the output of `bank_kernel`; then BANK_ROWS per sensor, the first two as above.
 LEVEL, BANK_HEADER_ROWS = 2, 3
 REFUSED, BANK_ROWS = 2, 3
-# A reading beyond this [rad/s] is no rate, whatever the gate says: it would overflow the derivatives of the rate.
+# A reading beyond this [rad/s] is no rate but a missing reading: its square would overflow.
 LARGEST_RATE = 1e6
+# A reading that many standard deviations of its innovation off is a spike and left out, but not more than PATIENCE in a row: what lasts
+# longer is the signal. So wide that the lag behind a fast signal stays inside, and a spike inside does no harm that lasts.
+GATE, PATIENCE = 1000.0, 10
 # Beyond this [rad^2/s^2] a filter of the bank knows nothing of the rate.
 LOST_VARIANCE = 1.0
 # Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
@@ -56,6 +59,7 @@ SENSOR = np.dtype(
         ("floor", np.float64),
         ("clamp", np.float64),  # factor around the band's R, infinite for none
         ("hits", np.int64),  # times that a bound of R held
+        ("outside", np.int64),  # readings in a row outside the gate
         ("previous_innovation", np.float64),
         ("previous_reading", np.float64),
         ("increments", np.int64),  # k - 1
@@ -89,6 +93,12 @@ def move(x, F, moved, n):  # pragma: no cover
 def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
     """Set x = F x and P = F P F' + Q, exactly symmetric."""
     move(x, F, moved, n)
+    grow(P, F, Q, work, n)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def grow(P, F, Q, work, n):  # pragma: no cover
+    """Set P = F P F' + Q, exactly symmetric."""
     for i in range(n):
         for j in range(n):
             work[i, j] = F[i, 0] * P[0, j]
@@ -116,6 +126,12 @@ def innovation(x, P, H, i, z, n):  # pragma: no cover
         e -= H[i, j] * x[j]
         spread += H[i, j] * total
     return e, spread
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def outside_gate(count, e, C):  # pragma: no cover
+    """Return how many readings in a row, `count` before this one, are outside the gate; up to PATIENCE of them are left out."""
+    return count + 1 if e * e > GATE * GATE * C else 0
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -315,15 +331,16 @@ def row_square(D, j, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
-    """Return run(x, P, F, Q, H, R, Z, started, out) -> started, the plain Kalman filter over a block.
+def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
 
     x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is (n_sensor, n_time);
+    `outside` (n_sensor,) counts as in `outside_gate`;
     `out` (HEADER_ROWS + INNOVATION_ROWS * n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, started, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912  # pragma: no cover
         # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
@@ -349,11 +366,15 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
                 due[i] = np.isfinite(Z[i, k])
                 e[i] = kind.type(0.0)
                 if due[i]:
-                    read = True
                     if form == SQUARE_ROOT:
                         e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
                     else:
                         e[i], spread = innovation(x, P, H, i, kind.type(Z[i, k]), n)
+                    outside[i] = outside_gate(outside[i], e[i], spread + R[i])
+                    if 0 < outside[i] <= PATIENCE:
+                        due[i], e[i] = False, kind.type(0.0)
+                        continue
+                    read = True
                     out[row + INNOVATION, k] = e[i]
                     out[row + INNOVATION_VARIANCE, k] = spread + R[i]
             if read:
@@ -386,28 +407,20 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
     """Return run(x, P, F, Q, H, K, C, settled, Z, progress, out), a filter of settled gains over a block.
 
     K (n_step, n, n_sensor), C (n_step, n_sensor), the variance of an innovation, and `settled` (n_step, n, n), the covariance after the
-    readings, repeat; `progress` = [started, step]. P follows `settled` while readings come, and grows by F P F' + Q while none does.
-    `out` as in `kalman_kernel`.
+    readings, repeat; `progress` = [started, step], then one count per sensor as in `outside_gate`. P follows
+    `settled` while readings come, and grows by F P F' + Q while none does. `out` as in `kalman_kernel`.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # pragma: no cover
         x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H = np.empty((n_sensor, n))
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         for k in range(Z.shape[1]):
-            read = False
-            for i in range(n_sensor):
-                read = read or np.isfinite(Z[i, k])
-            if progress[0] > 0 and read:
-                for i in range(n):
-                    moved[i] = 0.0
-                    for j in range(n):
-                        moved[i] += F[i, j] * x[j]
-                x[:] = moved
-            elif progress[0] > 0:
-                predict(x, P, F, Q, work, moved, n)
+            read, started = False, progress[0] > 0
+            if started:
+                move(x, F, moved, n)
             for i in range(n_sensor):
                 row = HEADER_ROWS + INNOVATION_ROWS * i
                 e[i] = np.nan
@@ -415,6 +428,13 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
                     e[i] = Z[i, k]
                     for j in range(n):
                         e[i] -= H[i, j] * x[j]
+                    # The gains are settled from the start, but what is known of the first reading is not.
+                    known = C[progress[1], i] if started else innovation(x, P, H, i, Z[i, k], n)[1]
+                    progress[2 + i] = outside_gate(progress[2 + i], e[i], known)
+                    if 0 < progress[2 + i] <= PATIENCE:
+                        e[i] = np.nan
+                    else:
+                        read = True
                 out[row + INNOVATION, k] = e[i]
                 out[row + INNOVATION_VARIANCE, k] = C[progress[1], i] if np.isfinite(e[i]) else np.nan
             for i in range(n_sensor):
@@ -424,6 +444,8 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
             if read:
                 progress[0] = 1
                 P[:] = settled[progress[1]]
+            elif started:
+                grow(P, F, Q, work, n)
             progress[1] = (progress[1] + 1) % len(K)
             out[RATE, k] = x[0]
             out[STD, k] = np.sqrt(P[0, 0])
@@ -520,9 +542,6 @@ def admit(watch, z, smallest, gate, patience, stuck_after):  # pragma: no cover
 
     `smallest` is its innovation over the standard deviation, in the filter that finds it least surprising.
     """
-    if abs(z) > LARGEST_RATE:
-        watch[3] += 1.0
-        return False
     watch[1] = watch[1] + 1.0 if z == watch[0] else 0.0
     watch[0] = z
     stuck = stuck_after > 0 and watch[1] >= stuck_after
@@ -795,12 +814,16 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 e[i], R[i] = kind.type(0.0), kind.type(1.0)
                 if not due[i]:
                     continue
-                read = True
                 z = kind.type(Z[i, k] - sensors[i].offset)
                 if form == SQUARE_ROOT:
                     e[i], spread[i] = innovation_root(x, P, H, i, z, n)
                 else:
                     e[i], spread[i] = innovation(x, P, H, i, z, n)
+                sensors[i].outside = outside_gate(sensors[i].outside, e[i], spread[i] + sensors[i].R)
+                if 0 < sensors[i].outside <= PATIENCE:
+                    due[i], e[i] = False, kind.type(0.0)
+                    continue
+                read = True
                 square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
             if adapts_Q:
                 for j in range(n):
@@ -820,7 +843,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                     elif form == CONVENTIONAL:
                         update_plain(x, P, H, i, z, R[i], g, K, n)
                     learn(sensors[i], e[i], square[i], spread[i])
-                elif np.isinf(Z[i, k]):
+                elif not np.isnan(Z[i, k]):
                     sensors[i].previous_innovation = np.nan
                     sensors[i].previous_reading = np.nan
                 hits += sensors[i].hits

@@ -79,7 +79,7 @@ class SteadyState(BlockFilter):
         self._K = np.ascontiguousarray(fixed.K[:, 0])
         self._C = np.einsum("ij,pjk,ik->pi", self.model.H, fixed.prior[:, 0], self.model.H) + self.model.R
         self._settled = np.ascontiguousarray(fixed.posterior()[:, 0])
-        self._progress = np.zeros(2, dtype=np.int64)
+        self._progress = np.zeros(2 + len(self.model.H), dtype=np.int64)
         self._run = fixed_gain_kernel(self._x.size, len(self.model.H))
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:

@@ -16,7 +16,7 @@ from testbed.report.figures import errors_figure, rates_figure, spectrum_figure,
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
 from testbed.report.numbers import fixed, plain, significant
 from testbed.report.svg import svg_text
-from testbed.report.words import METRICS, further, honesty, ratio_to_floor, summary
+from testbed.report.words import METRICS, claims, further, honesty, ratio_to_floor, summary
 from testbed.store import write_text
 
 REPORT = "report.html"
@@ -70,6 +70,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         names=_shown_metrics(metrics),
         line_sources=_line_sources(metrics),
         further=further(metrics),
+        claims=claims(metrics),
         summary=summary(metrics, digest),
         scenario=scenario,
         digest=digest,

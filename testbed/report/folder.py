@@ -34,6 +34,13 @@ class LineMetrics(_Metrics):
     optimum_deg_s: float | None = None
 
 
+class ConsistencyMetrics(_Metrics):
+    """How a filter's claims hold [-]: normalised error squared, per sensor (further keys) innovations and their whiteness, and the verdict."""
+
+    nees: float | None = None
+    verdict: str | None = None
+
+
 class SourceMetrics(_Metrics):
     """Errors of one sensor or filter [deg/s]; None where undefined."""
 
@@ -44,6 +51,7 @@ class SourceMetrics(_Metrics):
     optimum_rmse_deg_s: float | None = None
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
+    consistency: ConsistencyMetrics | None = None
     lines: list[LineMetrics] | None = None
 
 

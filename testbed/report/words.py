@@ -93,6 +93,17 @@ def honesty(inside: float) -> str:
     return "agrees with the error it makes"
 
 
+def claims(metrics: RunMetrics) -> dict[str, dict[str, Any]]:
+    """Return by filter the rows of the table of consistency: sensor -> value and bound of NIS and whiteness, of filters that have a verdict."""
+    rows = {}
+    for name, source in metrics.fusion.items():
+        if source.consistency is not None and source.consistency.verdict is not None:
+            extra = source.consistency.model_extra or {}
+            keys = ("nis", "nis_bounds", "whiteness", "whiteness_bound")
+            rows[name] = {sensor: {key: extra.get(f"{key}_{sensor}") for key in keys} for sensor in metrics.sensors}
+    return rows
+
+
 def _expectations(metrics: RunMetrics) -> str:
     n_all, n_met = len(metrics.expectations), sum(item.met for item in metrics.expectations)
     if n_all == 0:

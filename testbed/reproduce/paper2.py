@@ -6,18 +6,20 @@ is driven by exact sines, since the table has no torque for 50 deg/s at 60 Hz.
 
 from __future__ import annotations
 
+import copy
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from testbed.fusion import estimate
+from testbed.fusion.allan_srkf import AllanSrkf, AllanSrkfParameters
+from testbed.fusion.belief import load_belief
 from testbed.sensors import load_preset
 from testbed.spectra import WelchDensity, log_average
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from testbed.sensors.mhd_ars import MhdArs
@@ -40,10 +42,10 @@ class Protocol:
         Grid of the scale factor, whose mean over the amplitudes counts [deg/s], [Hz].
     linear_amplitudes, linear_frequencies : tuple of float
         Grid of the linearity [deg/s], [Hz].
-    settle, observe : float
-        Time before each measurement, and least time of it; it lasts a whole number of periods [s].
+    settle, observe, linear_observe : float
+        Time before each measurement, and least time of it for scale factor and linearity; it lasts a whole number of periods [s].
     warm_up, standstill : float
-        Time before the record of the noise, until the gain of the gyro has settled, and its length [s].
+        Time at standstill before linearity and the record of the noise, until the gain of the gyro has settled, and that record's length [s].
     """
 
     scale_amplitudes: tuple[float, ...] = (20.0, 30.0, 40.0, 50.0)
@@ -56,11 +58,24 @@ class Protocol:
     linear_frequencies: tuple[float, ...] = (0.2, 2.0, 20.0, 50.0)
     settle: float = 1.0
     observe: float = 1.0
+    linear_observe: float = 10.0
     warm_up: float = 300.0
     standstill: float = 120.0
 
 
-def read(rate: FloatArray, seed: int, **parameters: Any) -> dict[str, FloatArray]:
+def switched_on(**parameters: Any) -> AllanSrkf:
+    """Return the filter `allan_srkf` with belief `paper2`, both sensors at the common clock.
+
+    Parameters
+    ----------
+    **parameters : Any
+        Of the filter.
+    """
+    clock = dict.fromkeys(CHANNELS[:2], CLOCK_HZ)
+    return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**parameters))
+
+
+def read(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]:
     """Return the readings of both sensors and the fused rate.
 
     Parameters
@@ -69,8 +84,8 @@ def read(rate: FloatArray, seed: int, **parameters: Any) -> dict[str, FloatArray
         True rate at the common clock [rad/s].
     seed : int
         Seed of the sensors' noise.
-    **parameters : Any
-        Of the filter `allan_srkf`.
+    stage : AllanSrkf
+        The filter, which stays on.
 
     Returns
     -------
@@ -82,9 +97,7 @@ def read(rate: FloatArray, seed: int, **parameters: Any) -> dict[str, FloatArray
         "mems_gyro": gyro.start(CLOCK_HZ, seed, "mems_gyro").process(rate),
         "mhd_ars": load_preset("mhd03").start(CLOCK_HZ, seed, "mhd_ars").process(rate),
     }
-    clock = dict.fromkeys(readings, CLOCK_HZ)
-    fused = estimate("allan_srkf", readings, sample_rate_hz=clock, belief="paper2", **parameters).rate
-    return readings | {"fused": fused}
+    return readings | {"fused": stage.process(readings).rate}
 
 
 def mhd_response(freq_hz: FloatArray) -> ComplexArray:
@@ -92,8 +105,11 @@ def mhd_response(freq_hz: FloatArray) -> ComplexArray:
     return load_preset("mhd03").response(freq_hz)
 
 
-def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, **parameters: Any) -> list[float]:
+def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, stage: AllanSrkf) -> list[float]:
     """Return the amplitude of each channel for a sine.
+
+    Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise referred to the rate
+    does, and what leaks of a drift into the k-th line falls as k^-5 then.
 
     Parameters
     ----------
@@ -103,8 +119,8 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
         Seed of the noise.
     protocol : Protocol
         Its times.
-    **parameters : Any
-        Of the filter.
+    stage : AllanSrkf
+        The filter.
 
     Returns
     -------
@@ -112,10 +128,12 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
         Fourier amplitudes over whole periods, in the order of `CHANNELS` [deg/s].
     """
     first = round(protocol.settle * CLOCK_HZ)
-    n_time = first + round(np.ceil(protocol.observe * freq_hz - 1e-9) / freq_hz * CLOCK_HZ)
+    periods = np.ceil(protocol.observe * freq_hz - 1e-9)
+    n_time = first + round(periods / freq_hz * CLOCK_HZ)
     turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / CLOCK_HZ
-    signals = read(amplitude * DEG * np.sin(turns), seed, **parameters)
-    line = np.exp(-1j * turns[first:])
+    signals = read(amplitude * DEG * np.sin(turns), seed, stage)
+    window = (1.0 - np.cos(turns[first:] / periods)) ** 2 / 1.5 if periods >= 3.0 else 1.0
+    line = window * np.exp(-1j * turns[first:])
     return [float(2.0 * np.abs(np.mean(signals[name][first:] * line)) / DEG) for name in CHANNELS]
 
 
@@ -134,15 +152,39 @@ def scale_factor(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray
     return np.array(
         [
             np.mean(
-                [np.array(amplitudes(f, a, seed, protocol, **parameters)) / a for a in protocol.scale_amplitudes], 0
+                [
+                    np.array(amplitudes(f, a, seed, protocol, switched_on(**parameters))) / a
+                    for a in protocol.scale_amplitudes
+                ],
+                0,
             )
             for f in protocol.scale_frequencies
         ]
     )
 
 
+def settle_filter(seed: int, protocol: Protocol, **parameters: Any) -> Callable[[], AllanSrkf]:
+    """Return what makes filters that have run through `warm_up` at standstill.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the noise.
+    protocol : Protocol
+        Its `warm_up`.
+    **parameters : Any
+        Of the filter.
+    """
+    stage = switched_on(**parameters)
+    for second in range(0, round(protocol.warm_up), 10):
+        read(np.zeros(round(min(10.0, protocol.warm_up - second) * CLOCK_HZ)), 1000 * seed - 1 - second, stage)
+    return lambda: copy.deepcopy(stage)
+
+
 def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
     """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of `CHANNELS` [-].
+
+    Every amplitude has noise of its own: the same noise in all of them would cancel. The filter has settled at standstill before each frequency.
 
     Parameters
     ----------
@@ -154,9 +196,12 @@ def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
         Of the filter.
     """
     truth = np.array(protocol.linear_amplitudes)
+    longer = replace(protocol, observe=protocol.linear_observe)
+    settled = settle_filter(seed, protocol, **parameters)
     rows = []
-    for f in protocol.linear_frequencies:
-        found = np.array([amplitudes(f, a, seed, protocol, **parameters) for a in truth])
+    for i, f in enumerate(protocol.linear_frequencies):
+        noises = [1000 * seed + 100 * i + j for j in range(truth.size)]
+        found = np.array([amplitudes(f, a, noise, longer, settled()) for a, noise in zip(truth, noises, strict=True)])
         slope, offset = np.polyfit(truth, found, 1)
         deviation = np.abs(found - truth[:, None] * slope - offset)
         rows.append(deviation.max(axis=0) / found[-1])
@@ -180,7 +225,8 @@ def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[Flo
     freq_hz, density : ndarray, shapes (n_bin,), (n_bin, 4)
         Frequency [Hz]; gyro, MHD ARS, fused, and MHD ARS referred to the rate by its response, two-sided [rad^2/s].
     """
-    signals = read(np.zeros(round((protocol.warm_up + protocol.standstill) * CLOCK_HZ)), seed, **parameters)
+    n_time = round((protocol.warm_up + protocol.standstill) * CLOCK_HZ)
+    signals = read(np.zeros(n_time), seed, switched_on(**parameters))
     columns = []
     for name in CHANNELS:
         welch = WelchDensity(CLOCK_HZ, round(CLOCK_HZ * min(4.0, protocol.standstill / 2.0)))

@@ -22,7 +22,9 @@ Q_RATE = 0.3 * DEG**2
 
 def _run(model: FusionModel, Z: FloatArray, x: FloatArray, P: FloatArray) -> FloatArray:
     out = np.empty((2 + 2 * len(model.H), Z.shape[1]))
-    kalman_kernel(x.size, len(model.H))(x, P, model.F, model.Q, model.H, model.R, Z, False, out)
+    kalman_kernel(x.size, len(model.H))(
+        x, P, model.F, model.Q, model.H, model.R, Z, np.zeros(len(model.H), dtype=int), False, out
+    )
     return out
 
 
