@@ -24,7 +24,7 @@ _MARGIN = 0.05
 
 
 @njit(cache=True)
-def _advance(state, temperature, gains, plays, degree, slopes, reference, smoothing, out):  # pragma: no cover
+def _advance(state, temperature, gains, plays, degree, slopes, reference, delay, out):  # pragma: no cover
     """Fill one row of `out` per reading; `state` holds two smoothing stages, the lags, the play operators."""
     n_lag, n_play = gains.size - 2, plays.size
     for k in range(temperature.size):
@@ -44,7 +44,7 @@ def _advance(state, temperature, gains, plays, degree, slopes, reference, smooth
             out[k, column] = power
             column += 1
         if slopes:
-            slope = (smooth - state[1]) / smoothing
+            slope = (smooth - state[1]) / delay
             out[k, column] = slope
             out[k, column + 1] = (smooth - reference) * slope
             column += 2
@@ -161,6 +161,8 @@ class FeatureStage:
         self._features = features
         times = np.array([features.smoothing, features.smoothing, *features.lags])
         self._gains = -np.expm1(-1.0 / (checked_rate(sample_rate_hz) * times))
+        # By which the second pole lags a ramp: smoothing less half a sample.
+        self._delay = (1.0 / self._gains[1] - 1.0) / sample_rate_hz
         self._plays = np.array(features.plays, dtype=np.float64)
         self._state: FloatArray | None = None
 
@@ -196,7 +198,7 @@ class FeatureStage:
                 which.degree,
                 which.slopes,
                 which.reference,
-                which.smoothing,
+                self._delay,
                 out,
             )
         return out

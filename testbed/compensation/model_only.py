@@ -129,10 +129,14 @@ class DriftModel:
             raise ValueError(msg)
         try:
             method = document["method"]
-            features = {key: tuple(v) if isinstance(v, list) else v for key, v in document["features"].items()}
+            features: dict[str, Any] = {
+                key: tuple(v) if isinstance(v, list) else v for key, v in document["features"].items()
+            }
             return cls(
                 method,
-                *(float(document[key]) for key in ("sample_rate_hz", "mean_rate", "blocked_error")),
+                float(document["sample_rate_hz"]),
+                float(document["mean_rate"]),
+                float(document["blocked_error"]),
                 Features(**features),
                 Scaling(**_arrays(document["scaling"])),
                 _MACHINES[METHODS[method][0]](**_arrays(document["machine"])),
@@ -222,6 +226,7 @@ def train(
         raise ValueError(msg)
     machine, own = METHODS[method]
     chosen = own if features is None else features
+    fitted: Lssvm | Polynomial
     if machine == "lssvm":
         rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT)
         fitted, error = training.fit_lssvm(rows, seed)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 # Equation (21) and below: the box of the wolves for gamma and sigma^2.
 _BOUNDS = ((10.0, 1e5), (1e-6, 1e6))
 _BLOCK = 7200.0
+TEMPERATURE_ALONE = Features(degree=1, slopes=False, lags=())
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class PaperOptions:
     noise_modes: Literal["filter", "drop"] = "filter"
     factor: float | None = 0.583
     ratio: float | None = None
-    features: Features = Features(degree=1, slopes=False, lags=())
+    features: Features = TEMPERATURE_ALONE
     fitness: Literal["training", "blocked"] = "training"
     log_search: bool = True
     wolves: int = 50

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import differential_evolution, minimize
+from scipy.optimize import Bounds, differential_evolution, minimize
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
     Objective = Callable[[FloatArray], float]
-    Bounds = Sequence[tuple[float, float]]
+    Box = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Best:
     evaluations: int
 
 
-class _Box:
+class _Counted:
     """The objective on the box in the coordinates of the search; counts, and remembers the best."""
 
-    def __init__(self, objective: Objective, bounds: Bounds, *, log: bool) -> None:
+    def __init__(self, objective: Objective, bounds: Box, *, log: bool) -> None:
         box = np.array(bounds, dtype=np.float64)
         if box.ndim != 2 or box.shape[1] != 2 or not np.all(box[:, 0] < box[:, 1]) or not np.isfinite(box).all():
             msg = f"bounds: expected pairs of finite numbers, lower before upper, got {bounds}"
@@ -61,7 +61,7 @@ class _Box:
 
 def grey_wolf(
     objective: Objective,
-    bounds: Bounds,
+    bounds: Box,
     *,
     wolves: int = 50,
     iterations: int = 20,
@@ -100,7 +100,7 @@ def grey_wolf(
     ----------
     Mirjalili, Mirjalili, Lewis, "Grey wolf optimizer", Adv. Eng. Softw. 69 (2014).
     """
-    box, rng = _Box(objective, bounds, log=log), np.random.default_rng(seed)
+    box, rng = _Counted(objective, bounds, log=log), np.random.default_rng(seed)
     pack = rng.uniform(box.low, box.high, (wolves, box.low.size))
     leaders, values = pack[:0], np.empty(0)
     for i in range(iterations):
@@ -116,7 +116,7 @@ def grey_wolf(
 
 def evolve(
     objective: Objective,
-    bounds: Bounds,
+    bounds: Box,
     *,
     population: int = 8,
     generations: int = 6,
@@ -157,8 +157,8 @@ def evolve(
     ----------
     Storn and Price, J. Global Optim. 11 (1997); Nelder and Mead, Comput. J. 7 (1965); both as in scipy.
     """
-    box = _Box(objective, bounds, log=log)
-    limits = list(zip(box.low, box.high, strict=True))
+    box = _Counted(objective, bounds, log=log)
+    limits = Bounds(box.low, box.high)
     found = differential_evolution(
         box, limits, popsize=population, maxiter=generations, tol=0.0, polish=False, rng=np.random.default_rng(seed)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -120,7 +121,7 @@ def _folds(sizes: list[int], fold: float) -> list[slice]:
     folds, start = [], 0
     for size in sizes:
         edges = start + np.linspace(0, size, max(2, round(size / fold)) + 1).round().astype(int)
-        folds += [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        folds += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
         start += size
     return folds
 
