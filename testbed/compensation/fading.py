@@ -20,9 +20,10 @@ from testbed.compensation.record import checked
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
-# Autocorrelations of the innovation that must vanish, and the calibration factors tried.
+# Autocorrelations of the innovation that must vanish, and the calibration factors and ratios tried.
 _LAGS = 20
 _FACTORS = np.geomspace(0.05, 2.0, 60)
+_RATIOS = np.geomspace(1e-6, 1e2, 49)
 
 
 @njit(cache=True)
@@ -120,22 +121,20 @@ def fading_memory(z: FloatArray, s: float, q: float) -> tuple[FloatArray, FloatA
     return estimate, innovation
 
 
-def noise_ratio(z: FloatArray, *, least: float = 1e-8) -> float:
-    """Return Q/R of a random walk in white noise from the differences d of its samples.
-
-    var d = Q + 2 R and the covariance of neighbouring differences is -R.
+def choose_ratio(z: FloatArray) -> float:
+    """Return the Q/R whose plain filter (s = 1) foresees the next sample best: maximum likelihood, R being free.
 
     Parameters
     ----------
     z : ndarray, shape (n_time,)
-        Samples, any unit.
-    least : float
-        Smallest ratio, and the inverse of the largest [-].
+        Samples, any unit, not constant.
+
+    Returns
+    -------
+    float
+        Q / R, one of 49 from 1e-6 to 1e2 [-].
     """
-    d = np.diff(checked("z", z))
-    variance, neighbour = float(np.mean(d * d)), float(np.mean(d[1:] * d[:-1]))
-    R = max(-neighbour, 0.0)
-    return float(np.clip((variance - 2.0 * R) / R, least, 1.0 / least)) if R > 0.0 else 1.0 / least
+    return float(min(_RATIOS, key=lambda q: _mean_square(fading_memory(z, 1.0, float(q))[1])))
 
 
 def choose_factor(z: FloatArray, q: float) -> float:
@@ -162,3 +161,7 @@ def _colour(innovation: FloatArray) -> float:
     e = innovation - innovation.mean()
     power = float(e @ e)
     return sum((float(e[lag:] @ e[:-lag]) / power) ** 2 for lag in range(1, _LAGS + 1))
+
+
+def _mean_square(innovation: FloatArray) -> float:
+    return float(innovation @ innovation) / innovation.size

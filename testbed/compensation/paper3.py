@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from testbed.compensation import lssvm
-from testbed.compensation.fading import choose_factor, fading_memory, noise_ratio
+from testbed.compensation.fading import choose_factor, fading_memory, choose_ratio
 from testbed.compensation.features import Features
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.search import Best, grey_wolf
@@ -50,7 +50,7 @@ class PaperOptions:
     factor : float or None
         s of equation (22); None: chosen by the whiteness of the innovation [-].
     ratio : float or None
-        Q/R of the filter; not given. None: from the differences of what is filtered [-].
+        Q/R of the filter; not given. None: the one that foresees best with s = 1 [-].
     features : Features
         What the machine sees; "temperature" in the paper, so T alone.
     fitness : {"training", "blocked"}
@@ -184,7 +184,7 @@ def _filter(fast: FloatArray, options: PaperOptions) -> tuple[FloatArray, float,
     """Return the filtered fast part, s and Q/R; without modes to filter it is zero."""
     if not fast.any():
         return fast, 1.0, 0.0
-    ratio = noise_ratio(fast) if options.ratio is None else options.ratio
+    ratio = choose_ratio(fast) if options.ratio is None else options.ratio
     factor = choose_factor(fast, ratio) if options.factor is None else options.factor
     return fading_memory(fast, factor, ratio)[0], factor, ratio
 
