@@ -18,21 +18,22 @@ from testbed.compensation.polynomial import Polynomial
 from testbed.compensation.record import checked
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from testbed.compensation.record import Record
     from testbed.signals import FloatArray
 
+    Fit = Callable[[training.Rows, int], tuple[Lssvm | Polynomial, float]]
+
 _FORMAT, _VERSION = "testbed drift model", 1
 _MACHINES: dict[str, type[Lssvm | Polynomial]] = {"lssvm": Lssvm, "polynomial": Polynomial}
-_BASELINE = Features(lags=())
-# What each method is: the machine, and the features unless told otherwise.
-METHODS = {
-    "gradient": ("polynomial", Features()),
-    "lssvm": ("lssvm", Features()),
-    "polynomial": ("polynomial", _BASELINE),
+# What each method is: the kind of machine, how it is fitted, and the features unless told otherwise.
+METHODS: dict[str, tuple[str, Fit, Features]] = {
+    "gradient": ("polynomial", training.fit_coloured, Features()),
+    "lssvm": ("lssvm", training.fit_lssvm, Features()),
+    "polynomial": ("polynomial", training.fit_polynomial, Features(lags=())),
 }
 
 
@@ -68,7 +69,8 @@ class DriftModel:
     mean_rate : float
         Mean of the training rates [rad/s]: Earth rate and constant bias. For information; it is never subtracted.
     blocked_error : float
-        Rms of the blocked cross-validation error, noise of the row means included [rad/s].
+        Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` of what is new in
+        each row [rad/s].
     features : Features
         What is formed of the temperature.
     scaling : Scaling
@@ -195,15 +197,16 @@ def train(
     """Train a drift model on thermal cycles at constant true rate; one up-first and one down-first tell temperature from time.
 
     The mean over all cycles is taken off before and given back to nobody: the drift is zero on average over the training rows, so
-    Earth rate and constant bias stay in the compensated rate. A rate that changes within or between the cycles is taken for drift.
+    Earth rate and constant bias stay in the compensated rate. A rate that changes within a cycle is taken for drift; one that
+    changes between cycles (bias at turn-on) is not by `gradient`, where each cycle has a constant of its own.
 
     Parameters
     ----------
     cycles : sequence of Record
         Training records at one sample rate.
     method : str
-        `gradient` (least squares in powers of T, slope and gradient features), `lssvm` (the paper's machine on the same
-        features), or `polynomial` (the baseline, without gradients).
+        `gradient` (least squares under 1/f noise in powers of T, slope and gradient features), `lssvm` (the paper's machine on
+        the same features), or `polynomial` (the baseline: ordinary least squares without gradients).
     features : Features, optional
         Other features than the method's own.
     seed : int
@@ -224,15 +227,10 @@ def train(
     if method not in METHODS:
         msg = f"method: expected one of {', '.join(METHODS)}, got {method!r}"
         raise ValueError(msg)
-    machine, own = METHODS[method]
+    kind, fit, own = METHODS[method]
     chosen = own if features is None else features
-    fitted: Lssvm | Polynomial
-    if machine == "lssvm":
-        rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT)
-        fitted, error = training.fit_lssvm(rows, seed)
-    else:
-        rows = training.gather(cycles, chosen, block=block)
-        fitted, error = training.fit_polynomial(rows)
+    rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT if kind == "lssvm" else None)
+    fitted, error = fit(rows, seed)
     return DriftModel(method, cycles[0].sample_rate_hz, rows.mean_rate, error, chosen, rows.scaling, fitted)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from testbed.compensation import lssvm
-from testbed.compensation.fading import choose_factor, fading_memory, choose_ratio
+from testbed.compensation.fading import choose_factor, choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.search import Best, grey_wolf

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A fitted weighted sum of standardised features; a polynomial in the temperature through its features.
+    """A weighted sum of standardised features; a polynomial in the temperature through its features.
 
     Parameters
     ----------
@@ -28,30 +28,6 @@ class Polynomial:
     weights: FloatArray
     bias: float
 
-    @classmethod
-    def fit(cls, Z: FloatArray, y: FloatArray, penalty: float = 0.0) -> Polynomial:
-        r"""Minimise :math:`|y - Z w - b|^2 + n \lambda |w|^2`.
-
-        Parameters
-        ----------
-        Z : ndarray, shape (n_row, n_feature)
-            Standardised features [-].
-        y : ndarray, shape (n_row,)
-            Target, any unit.
-        penalty : float
-            lambda, at least zero [-].
-
-        Returns
-        -------
-        Polynomial
-            Frozen; of least norm where features do not determine it.
-        """
-        mean = Z.mean(axis=0)
-        root = np.sqrt(y.size * penalty) * np.eye(Z.shape[1])
-        stacked, target = np.concatenate([Z - mean, root]), np.concatenate([y - y.mean(), np.zeros(len(root))])
-        weights = np.linalg.lstsq(stacked, target, rcond=None)[0]
-        return cls(weights, float(y.mean() - mean @ weights))
-
     def predict(self, Z: FloatArray) -> FloatArray:
         """Return the prediction at each row, shape (n_time,), of standardised features, shape (n_time, n_feature)."""
         # Column by column: the sum of a row does not depend on the number of rows, as that of a matrix product may.
@@ -61,19 +37,41 @@ class Polynomial:
         return total
 
 
-def block_residuals(Z: FloatArray, y: FloatArray, penalty: float, blocks: Sequence[slice]) -> FloatArray:
-    r"""Return each row's error under the polynomial fitted without the block that holds it.
-
-    .. math:: r_B = (I - H_{BB})^{-1} (y - H y)_B, \quad H = U (U'U + \Lambda)^{-1} U', \quad U = [1, Z]
+def penalised(U: FloatArray, y: FloatArray, ridge: FloatArray) -> FloatArray:
+    r"""Minimise :math:`|y - U w|^2 + \sum_j \rho_j w_j^2`.
 
     Parameters
     ----------
-    Z : ndarray, shape (n_row, n_feature)
-        Standardised features [-].
+    U : ndarray, shape (n_row, n_column)
+        Regressors, such as [1, Z].
     y : ndarray, shape (n_row,)
         Target, any unit.
-    penalty : float
-        lambda of `Polynomial.fit`, whose n lambda stays that of all rows; above zero [-].
+    ridge : ndarray, shape (n_column,)
+        rho, at least zero.
+
+    Returns
+    -------
+    ndarray, shape (n_column,)
+        w, of least norm where it is not determined.
+    """
+    stacked = np.concatenate([U, np.diag(np.sqrt(ridge))])
+    weights: FloatArray = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(ridge.size)]), rcond=None)[0]
+    return weights
+
+
+def block_residuals(U: FloatArray, y: FloatArray, ridge: FloatArray, blocks: Sequence[slice]) -> FloatArray:
+    r"""Return each row's error under the `penalised` fit without the block that holds it.
+
+    .. math:: r_B = (I - H_{BB})^{-1} (y - H y)_B, \quad H = U (U'U + \mathrm{diag}\,\rho)^{-1} U'
+
+    Parameters
+    ----------
+    U : ndarray, shape (n_row, n_column)
+        Regressors.
+    y : ndarray, shape (n_row,)
+        Target, any unit.
+    ridge : ndarray, shape (n_column,)
+        rho, large enough that U'U + diag rho is not singular.
     blocks : sequence of slice
         Contiguous rows, which together cover all.
 
@@ -82,10 +80,7 @@ def block_residuals(Z: FloatArray, y: FloatArray, penalty: float, blocks: Sequen
     ndarray, shape (n_row,)
         Errors, unit of `y`.
     """
-    U = np.column_stack([np.ones(y.size), Z])
-    normal = U.T @ U
-    normal[1:, 1:] += y.size * penalty * np.eye(Z.shape[1])
-    half = np.linalg.solve(np.linalg.cholesky(normal), U.T)
+    half = np.linalg.solve(np.linalg.cholesky(U.T @ U + np.diag(ridge)), U.T)
     residuals = y - half.T @ (half @ y)
     left_out = np.empty(y.size)
     for rows in blocks:

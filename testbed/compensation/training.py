@@ -10,6 +10,7 @@ import numpy as np
 
 from testbed.compensation import lssvm, polynomial
 from testbed.compensation.features import Scaling
+from testbed.compensation.flicker import whiten
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.polynomial import Polynomial
 from testbed.compensation.search import evolve
@@ -27,6 +28,10 @@ MOST_SUPPORT = 900
 # Standardised features: a kernel narrower than half a standard deviation learns time, one wider than a thousand is flat.
 _GAMMAS, _WIDTHS2 = (1e-2, 1e6), (0.3, 1e6)
 _PENALTIES = np.geomspace(1e-8, 1.0, 17)
+# A blocked error of 850 rows is known to sqrt(1 / 2 n) = 2.4 %: half a percent tells no penalty from another, and the largest is safest.
+_TOLERANCE = 1.005
+# Where 1/f and white noise of paper 3's gyro are equal, B^2 / (2 pi N^2) [Hz].
+_CORNER = 0.017
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,10 @@ class Rows:
         From features to Z.
     folds : list of slice
         Contiguous rows of one cycle each.
+    cycles : list of slice
+        Rows of each cycle.
+    average : float
+        Time that a row is the mean of [s].
     """
 
     Z: FloatArray
@@ -52,6 +61,8 @@ class Rows:
     mean_rate: float
     scaling: Scaling
     folds: list[slice]
+    cycles: list[slice]
+    average: float
 
 
 def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> Rows:
@@ -92,8 +103,11 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
     y = np.concatenate([block_means(each.rate, n_mean) for each in cycles])
     scaling = Scaling.fit(np.concatenate(X))
     mean = float(y.mean())
-    folds = _folds([len(part) for part in X], block * cycles[0].sample_rate_hz / n_mean)
-    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds)
+    average = n_mean / cycles[0].sample_rate_hz
+    ends = np.cumsum([0, *(len(part) for part in X)])
+    whole = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+    folds = [fold for rows in whole for fold in _folds(rows, block / average)]
+    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds, whole, average)
 
 
 def block_means(values: FloatArray, n_mean: int) -> FloatArray:
@@ -116,17 +130,14 @@ def block_means(values: FloatArray, n_mean: int) -> FloatArray:
     return means
 
 
-def _folds(sizes: list[int], fold: float) -> list[slice]:
-    """Return nearly equal contiguous folds of about `fold` rows, none across the border of two cycles."""
-    folds, start = [], 0
-    for size in sizes:
-        edges = start + np.linspace(0, size, max(2, round(size / fold)) + 1).round().astype(int)
-        folds += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
-        start += size
-    return folds
+def _folds(rows: slice, fold: float) -> list[slice]:
+    """Return nearly equal contiguous folds of about `fold` rows of one cycle, at least two."""
+    number = max(2, round((rows.stop - rows.start) / fold))
+    edges = np.linspace(rows.start, rows.stop, number + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
-def fit_polynomial(rows: Rows) -> tuple[Polynomial, float]:
+def fit_polynomial(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
     """Fit by least squares with the penalty of least blocked error; returns it and the rms of that error [rad/s].
 
     Parameters
@@ -134,9 +145,32 @@ def fit_polynomial(rows: Rows) -> tuple[Polynomial, float]:
     rows : Rows
         Training rows.
     """
-    errors = [_rms(polynomial.block_residuals(rows.Z, rows.y, penalty, rows.folds)) for penalty in _PENALTIES]
-    best = int(np.argmin(errors))
-    return Polynomial.fit(rows.Z, rows.y, _PENALTIES[best]), errors[best]
+    weights, error = _least_squares(np.column_stack([np.ones(rows.y.size), rows.Z]), rows.y, 1, rows.folds)
+    return Polynomial(weights[1:], float(weights[0])), error
+
+
+def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
+    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift; returns as `fit_polynomial`.
+
+    The error is that of the whitened rows: what is new in a row beyond the noise before it, in units of the noise's variance.
+
+    Parameters
+    ----------
+    rows : Rows
+        Training rows.
+    """
+    U, v = whiten(rows.Z, rows.y, rows.cycles, _CORNER * rows.average)
+    n_cycle = len(rows.cycles)
+    weights, error = _least_squares(U, v, n_cycle, rows.folds)
+    return Polynomial(weights[n_cycle:], 0.0), error
+
+
+def _least_squares(U: FloatArray, y: FloatArray, n_free: int, folds: list[slice]) -> tuple[FloatArray, float]:
+    """Return the weights under the largest penalty of nearly the least blocked error, and that error; the first columns are free."""
+    ridges = [y.size * penalty * (np.arange(U.shape[1]) >= n_free) for penalty in _PENALTIES]
+    errors = [_rms(polynomial.block_residuals(U, y, ridge, folds)) for ridge in ridges]
+    best = int(np.flatnonzero(np.array(errors) <= _TOLERANCE * min(errors))[-1])
+    return polynomial.penalised(U, y, ridges[best]), errors[best]
 
 
 def fit_lssvm(rows: Rows, seed: int) -> tuple[Lssvm, float]:

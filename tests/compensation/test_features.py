@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,7 +43,7 @@ def test_features_are_those_of_scipy_and_of_a_plain_loop(rng, sample_rate_hz):
     delay = 1.0 / np.expm1(1.0 / (sample_rate_hz * ALL.smoothing)) / sample_rate_hz
     slope, warm = (smooth - lag(smooth, ALL.smoothing)) / delay, smooth - 293.15
     lags = [smooth, *(lag(T, tau) for tau in ALL.lags)]
-    columns = [warm, warm**2, warm**3, slope, warm * slope, *(a - b for a, b in zip(lags[:-1], lags[1:], strict=True))]
+    columns = [warm, warm**2, warm**3, slope, warm * slope, *(a - b for a, b in itertools.pairwise(lags))]
     columns += [smooth - play(smooth, width) for width in ALL.plays]
     X = ALL.compute(T, sample_rate_hz)
     assert X.shape[1] == len(ALL.names) == len(columns)
