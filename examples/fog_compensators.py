@@ -1,7 +1,7 @@
 """Drift compensation of a fibre-optic gyro on thermal cycles that its model has not seen: the figures of docs/compensation_models.md.
 
-Simulated `fog_paper3` at 1 Hz on a fixed base, Earth rate 10.6 deg/h. Trained on one cycle (up-first) or two (one up-first, one down-first),
-10 % of the programmes' rates and turning points apart from the cycles that are judged; every cycle has noise of its own.
+Simulated `fog_paper3` at 1 Hz on a fixed base, Earth rate 10.6 deg/h. Trained on one cycle (up-first) or two (up-first and down-first) and
+judged on four others: the same two programmes and two with other rates, holds and turning points, all under noise of their own.
 
 Run it with ``python examples/fog_compensators.py [SEEDS]`` (default 6; about 2 min of processor time).
 """
