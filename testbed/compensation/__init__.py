@@ -1,4 +1,1 @@
-"""Drift compensation of a fibre-optic gyro: decompositions, entropies, filters and regressions that know arrays only.
-
-Nothing here knows a sensor model or the truth: what a compensator learns, it learns from readings of rate and temperature.
-"""
+"""Temperature drift of a fibre-optic gyro: the parts and the pipeline of paper 3, and a model that is trained on other cycles, frozen, and sees temperature only."""

@@ -1,0 +1,90 @@
+"""Rows, folds and the polynomial, against numpy and brute-force refits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, solve_triangular
+
+from testbed.compensation.features import Features
+from testbed.compensation.flicker import noise_root, whiten
+from testbed.compensation.polynomial import Polynomial, block_residuals, penalised
+from testbed.compensation.record import Record
+from testbed.compensation.training import block_means, fit_coloured, fit_polynomial, gather
+from tests.compensation.thermal_record import WHITE, flicker
+
+
+def record(rng, n=30_000, sample_rate_hz=1.0, rate=1e-7):
+    T = 293.15 + 20.0 * np.sin(np.arange(n) / 3000.0)
+    return Record(rate + 1e-9 * rng.normal(size=n), T, sample_rate_hz)
+
+
+@pytest.mark.oracle
+def test_penalised_solves_the_normal_equations(rng):
+    U, y, ridge = rng.normal(size=(80, 4)), rng.normal(size=80), np.array([0.0, 1.0, 2.0, 3.0])
+    expected = np.linalg.solve(U.T @ U + np.diag(ridge), U.T @ y)
+    assert np.allclose(penalised(U, y, ridge), expected, rtol=0.0, atol=1e-12)
+    predicted = Polynomial(expected, 2.0).predict(U)
+    assert np.allclose(predicted, U @ expected + 2.0, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.oracle
+def test_polynomial_block_residuals_are_those_of_refits(rng):
+    U, y, ridge = rng.normal(size=(90, 4)), rng.normal(size=90) + 3.0, np.array([0.0, 0.9, 0.9, 0.9])
+    blocks = [slice(0, 20), slice(20, 65), slice(65, 90)]
+    expected = np.empty(90)
+    for block in blocks:
+        rest = np.delete(np.arange(90), block)
+        expected[block] = y[block] - U[block] @ penalised(U[rest], y[rest], ridge)
+    assert np.allclose(block_residuals(U, y, ridge, blocks), expected, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.oracle
+def test_whitened_least_squares_is_generalised_least_squares(rng):
+    """(U'C^-1 U)^-1 U'C^-1 y with the covariance of both cycles in one matrix."""
+    Z, y, cycles = rng.normal(size=(70, 2)), rng.normal(size=70), [slice(0, 30), slice(30, 70)]
+    C = block_diag(*(L @ L.T for L in (noise_root(30, 1.7), noise_root(40, 1.7))))
+    U = np.column_stack([np.arange(70) < 30, np.arange(70) >= 30, Z]).astype(float)
+    expected = np.linalg.solve(U.T @ np.linalg.solve(C, U), U.T @ np.linalg.solve(C, y))
+    assert np.allclose(penalised(*whiten(Z, y, cycles, 1.7), np.zeros(4)), expected, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.oracle
+def test_whitening_makes_the_noise_of_a_gyro_white(rng):
+    """Flicker drawn in frequency by the tests' generator, means over 100 s; autocorrelations of n white values spread by 1/sqrt(n)."""
+    n = 85_200
+    rows = block_means(WHITE * rng.normal(size=n) + flicker(n, rng), 100)
+    white = solve_triangular(noise_root(rows.size, 1.7), rows - rows.mean(), lower=True)
+    for lag in (1, 2, 5, 20, 100):
+        assert abs(np.corrcoef(white[lag:], white[:-lag])[0, 1]) < 4.0 / np.sqrt(rows.size)
+    assert np.corrcoef(rows[1:], rows[:-1])[0, 1] > 0.5
+
+
+def test_features_that_determine_nothing_get_no_weight(rng):
+    """A chamber that never moved: only rounding is left of every feature, and the drift is zero."""
+    still = Record(1e-7 + 1e-9 * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
+    rows = gather([still], Features(), block=7200.0)
+    for fit in (fit_polynomial, fit_coloured):
+        assert np.allclose(fit(rows)[0].weights, 0.0, rtol=0.0, atol=1e-15)
+
+
+def test_rows_are_means_and_folds_stay_within_a_cycle(rng):
+    cycles = [record(rng), record(rng, 45_050, rate=2e-7)]
+    rows = gather(cycles, Features(), block=7200.0)
+    assert rows.Z.shape == (300 + 450, len(Features().names))
+    assert np.allclose(rows.y + rows.mean_rate, np.concatenate([block_means(c.rate, 100) for c in cycles]), atol=1e-20)
+    # 30,000 s and 45,000 s in blocks of about two hours: four and six.
+    assert [fold.stop - fold.start for fold in rows.folds] == [75] * 10
+    assert [rows.folds[k].start for k in (0, 4)] == [0, 300]
+    assert np.allclose(rows.Z.mean(axis=0), 0.0, rtol=0.0, atol=1e-9)
+
+
+def test_a_limit_on_rows_makes_the_means_longer(rng):
+    rows = gather([record(rng), record(rng)], Features(), block=7200.0, most=200)
+    assert rows.y.size == 200
+
+
+def test_cycles_that_cannot_be_blocked_are_refused(rng):
+    for cycles in ([], [record(rng), record(rng, sample_rate_hz=2.0)], [record(rng, 14_000)]):
+        with pytest.raises(ValueError, match="cycles"):
+            gather(cycles, Features(), block=7200.0)
