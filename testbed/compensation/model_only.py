@@ -1,0 +1,250 @@
+"""The model-only compensator: trained on other thermal cycles, frozen, applied sample by sample.
+
+The drift it subtracts follows from the thermometer alone. The rate never enters, so a true rate of any period passes with gain
+one, and a residual can be no smaller than the gyro's own noise allows except by chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from testbed.compensation import training
+from testbed.compensation.features import Features, Scaling
+from testbed.compensation.lssvm import Lssvm
+from testbed.compensation.polynomial import Polynomial
+from testbed.compensation.record import checked
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from testbed.compensation.record import Record
+    from testbed.signals import FloatArray
+
+_FORMAT, _VERSION = "testbed drift model", 1
+_MACHINES: dict[str, type[Lssvm | Polynomial]] = {"lssvm": Lssvm, "polynomial": Polynomial}
+_BASELINE = Features(lags=())
+# What each method is: the machine, and the features unless told otherwise.
+METHODS = {
+    "gradient": ("polynomial", Features()),
+    "lssvm": ("lssvm", Features()),
+    "polynomial": ("polynomial", _BASELINE),
+}
+
+
+@dataclass(frozen=True)
+class CompensatedBlock:
+    """What a compensator gives for a block of readings.
+
+    Parameters
+    ----------
+    rate : ndarray, shape (n_time,)
+        Reading minus drift [rad/s].
+    drift : ndarray, shape (n_time,)
+        What was subtracted [rad/s].
+    extrapolated : ndarray of bool, shape (n_time,)
+        Whether a temperature feature lies outside what training has seen, by more than 5 % of its span.
+    """
+
+    rate: FloatArray
+    drift: FloatArray
+    extrapolated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class DriftModel:
+    """A trained and frozen model of the temperature drift.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    sample_rate_hz : float
+        Rate of the training records [Hz].
+    mean_rate : float
+        Mean of the training rates [rad/s]: Earth rate and constant bias. For information; it is never subtracted.
+    blocked_error : float
+        Rms of the blocked cross-validation error, noise of the row means included [rad/s].
+    features : Features
+        What is formed of the temperature.
+    scaling : Scaling
+        Standardisation by training statistics.
+    machine : Lssvm or Polynomial
+        From standardised features to drift [rad/s].
+    """
+
+    method: str
+    sample_rate_hz: float
+    mean_rate: float
+    blocked_error: float
+    features: Features
+    scaling: Scaling
+    machine: Lssvm | Polynomial
+
+    def start(self, sample_rate_hz: float | None = None) -> CompensatorStage:
+        """Return the compensator in time.
+
+        Parameters
+        ----------
+        sample_rate_hz : float, optional
+            Rate of the readings [Hz]; that of the training records if left out.
+        """
+        return CompensatorStage(self, self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz)
+
+    def apply(self, record: Record) -> CompensatedBlock:
+        """Compensate a whole record, the same bits as in blocks.
+
+        Parameters
+        ----------
+        record : Record
+            Readings at any sample rate.
+        """
+        return self.start(record.sample_rate_hz).process(record.rate, record.temperature)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain lists and numbers for JSON, which keeps every bit."""
+        return {"format": _FORMAT, "version": _VERSION, **_plain(asdict(self))}
+
+    @classmethod
+    def from_dict(cls, document: dict[str, Any]) -> DriftModel:
+        """Return the model that `to_dict` wrote.
+
+        Parameters
+        ----------
+        document : dict
+            As read from JSON.
+
+        Raises
+        ------
+        ValueError
+            If it is no drift model, of another version, or incomplete.
+        """
+        found = (document.get("format"), document.get("version"))
+        if found != (_FORMAT, _VERSION):
+            msg = f"drift model: expected format {_FORMAT!r} version {_VERSION}, got {found[0]!r} version {found[1]!r}"
+            raise ValueError(msg)
+        try:
+            method = document["method"]
+            features: dict[str, Any] = {
+                key: tuple(v) if isinstance(v, list) else v for key, v in document["features"].items()
+            }
+            return cls(
+                method,
+                float(document["sample_rate_hz"]),
+                float(document["mean_rate"]),
+                float(document["blocked_error"]),
+                Features(**features),
+                Scaling(**_arrays(document["scaling"])),
+                _MACHINES[METHODS[method][0]](**_arrays(document["machine"])),
+            )
+        except (KeyError, TypeError) as error:
+            msg = f"drift model: expected every field of version {_VERSION}, got {type(error).__name__}: {error}"
+            raise ValueError(msg) from error
+
+
+class CompensatorStage:
+    """A drift model at work on a stream; it learns nothing, and any division into blocks gives the same bits.
+
+    Parameters
+    ----------
+    model : DriftModel
+        Frozen model.
+    sample_rate_hz : float
+        Rate of the readings [Hz].
+    """
+
+    def __init__(self, model: DriftModel, sample_rate_hz: float) -> None:
+        self._model, self._features = model, model.features.start(sample_rate_hz)
+
+    def process(self, rate: FloatArray, temperature: FloatArray) -> CompensatedBlock:
+        """Compensate the next readings; each with readings up to its own, so without latency.
+
+        Parameters
+        ----------
+        rate : ndarray, shape (n_time,)
+            Gyro [rad/s].
+        temperature : ndarray, shape (n_time,)
+            Thermometer at the same instants [K].
+
+        Raises
+        ------
+        ValueError
+            If the lengths differ or a reading is not finite; the stage has then not moved.
+        """
+        readings, kelvin = checked("rate", rate), checked("temperature", temperature)
+        if readings.size != kelvin.size:
+            msg = f"temperature: expected one reading per rate, got {kelvin.size} for {readings.size}"
+            raise ValueError(msg)
+        Z = self._model.scaling.apply(self._features.process(kelvin))
+        drift = self._model.machine.predict(Z)
+        return CompensatedBlock(readings - drift, drift, self._model.scaling.extrapolated(Z))
+
+
+def train(
+    cycles: Sequence[Record],
+    *,
+    method: str = "gradient",
+    features: Features | None = None,
+    seed: int = 0,
+    block: float = 7200.0,
+) -> DriftModel:
+    """Train a drift model on thermal cycles at constant true rate; one up-first and one down-first tell temperature from time.
+
+    The mean over all cycles is taken off before and given back to nobody: the drift is zero on average over the training rows, so
+    Earth rate and constant bias stay in the compensated rate. A rate that changes within or between the cycles is taken for drift.
+
+    Parameters
+    ----------
+    cycles : sequence of Record
+        Training records at one sample rate.
+    method : str
+        `gradient` (least squares in powers of T, slope and gradient features), `lssvm` (the paper's machine on the same
+        features), or `polynomial` (the baseline, without gradients).
+    features : Features, optional
+        Other features than the method's own.
+    seed : int
+        Of the search for the machine's parameters.
+    block : float
+        Length of the contiguous blocks of the cross-validation that chooses them [s].
+
+    Returns
+    -------
+    DriftModel
+        Frozen model.
+
+    Raises
+    ------
+    ValueError
+        If the method is unknown or the records are too few or too short.
+    """
+    if method not in METHODS:
+        msg = f"method: expected one of {', '.join(METHODS)}, got {method!r}"
+        raise ValueError(msg)
+    machine, own = METHODS[method]
+    chosen = own if features is None else features
+    fitted: Lssvm | Polynomial
+    if machine == "lssvm":
+        rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT)
+        fitted, error = training.fit_lssvm(rows, seed)
+    else:
+        rows = training.gather(cycles, chosen, block=block)
+        fitted, error = training.fit_polynomial(rows)
+    return DriftModel(method, cycles[0].sample_rate_hz, rows.mean_rate, error, chosen, rows.scaling, fitted)
+
+
+def _plain(value: Any) -> Any:
+    """Return `value` with arrays and tuples as lists."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | tuple):
+        return [_plain(item) for item in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    return value
+
+
+def _arrays(document: dict[str, Any]) -> dict[str, Any]:
+    """Return `document` with lists as arrays."""
+    return {key: np.array(item, dtype=np.float64) if isinstance(item, list) else item for key, item in document.items()}

@@ -1,0 +1,161 @@
+"""Rows for training: block means of several cycles, their contiguous folds, and the fits with their blocked cross-validation."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.compensation import lssvm, polynomial
+from testbed.compensation.features import Scaling
+from testbed.compensation.lssvm import Lssvm
+from testbed.compensation.polynomial import Polynomial
+from testbed.compensation.search import evolve
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from testbed.compensation.features import Features
+    from testbed.compensation.record import Record
+    from testbed.signals import FloatArray
+
+# Rows are means over at least this time [s], and longer for a machine whose cost is cubic.
+_AVERAGE = 100.0
+MOST_SUPPORT = 900
+# Standardised features: a kernel narrower than half a standard deviation learns time, one wider than a thousand is flat.
+_GAMMAS, _WIDTHS2 = (1e-2, 1e6), (0.3, 1e6)
+_PENALTIES = np.geomspace(1e-8, 1.0, 17)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Training rows.
+
+    Parameters
+    ----------
+    Z : ndarray, shape (n_row, n_feature)
+        Standardised features [-].
+    y : ndarray, shape (n_row,)
+        Rate without the mean of all rows [rad/s].
+    mean_rate : float
+        That mean [rad/s].
+    scaling : Scaling
+        From features to Z.
+    folds : list of slice
+        Contiguous rows of one cycle each.
+    """
+
+    Z: FloatArray
+    y: FloatArray
+    mean_rate: float
+    scaling: Scaling
+    folds: list[slice]
+
+
+def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> Rows:
+    """Form rows from cycles: features at full rate, then means over whole blocks.
+
+    Parameters
+    ----------
+    cycles : sequence of Record
+        At one sample rate, each long enough for two folds.
+    features : Features
+        What is formed of the temperature.
+    block : float
+        Length of a fold [s].
+    most : int, optional
+        Most rows; the means get longer until they fit.
+
+    Returns
+    -------
+    Rows
+        Standardised by their own statistics.
+
+    Raises
+    ------
+    ValueError
+        If there is no cycle, their rates differ or one is shorter than two folds.
+    """
+    rates = {cycle.sample_rate_hz for cycle in cycles}
+    if len(rates) != 1:
+        msg = f"cycles: expected at least one, all at one sample rate, got the rates {sorted(rates)}"
+        raise ValueError(msg)
+    shortest, total = min(cycle.duration for cycle in cycles), sum(cycle.duration for cycle in cycles)
+    if not block > _AVERAGE or shortest < 2.0 * block:
+        msg = f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, got one of {shortest:g} s"
+        raise ValueError(msg)
+    average = _AVERAGE if most is None else max(_AVERAGE, total / most)
+    n_mean = max(1, round(average * rates.pop()))
+    X = [block_means(features.compute(each.temperature, each.sample_rate_hz), n_mean) for each in cycles]
+    y = np.concatenate([block_means(each.rate, n_mean) for each in cycles])
+    scaling = Scaling.fit(np.concatenate(X))
+    mean = float(y.mean())
+    folds = _folds([len(part) for part in X], block * cycles[0].sample_rate_hz / n_mean)
+    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds)
+
+
+def block_means(values: FloatArray, n_mean: int) -> FloatArray:
+    """Return the means of whole blocks of `n_mean` samples along the first axis; an incomplete last block is left out.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_time, ...)
+        Samples, any unit.
+    n_mean : int
+        Samples per block.
+
+    Returns
+    -------
+    ndarray, shape (n_time // n_mean, ...)
+        Means.
+    """
+    n_row = len(values) // n_mean
+    means: FloatArray = values[: n_row * n_mean].reshape(n_row, n_mean, *values.shape[1:]).mean(axis=1)
+    return means
+
+
+def _folds(sizes: list[int], fold: float) -> list[slice]:
+    """Return nearly equal contiguous folds of about `fold` rows, none across the border of two cycles."""
+    folds, start = [], 0
+    for size in sizes:
+        edges = start + np.linspace(0, size, max(2, round(size / fold)) + 1).round().astype(int)
+        folds += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+        start += size
+    return folds
+
+
+def fit_polynomial(rows: Rows) -> tuple[Polynomial, float]:
+    """Fit by least squares with the penalty of least blocked error; returns it and the rms of that error [rad/s].
+
+    Parameters
+    ----------
+    rows : Rows
+        Training rows.
+    """
+    errors = [_rms(polynomial.block_residuals(rows.Z, rows.y, penalty, rows.folds)) for penalty in _PENALTIES]
+    best = int(np.argmin(errors))
+    return Polynomial.fit(rows.Z, rows.y, _PENALTIES[best]), errors[best]
+
+
+def fit_lssvm(rows: Rows, seed: int) -> tuple[Lssvm, float]:
+    """Fit a machine with gamma and sigma^2 of least blocked error; returns it and the rms of that error [rad/s].
+
+    Parameters
+    ----------
+    rows : Rows
+        Training rows.
+    seed : int
+        Of the search.
+    """
+
+    def objective(point: FloatArray) -> float:
+        return float(np.log(_rms(lssvm.block_residuals(rows.Z, rows.y, point[0], point[1], rows.folds))))
+
+    best = evolve(objective, (_GAMMAS, _WIDTHS2), seed=seed, log=True)
+    return Lssvm.fit(rows.Z, rows.y, best.point[0], best.point[1]), float(np.exp(best.value))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values * values)))
