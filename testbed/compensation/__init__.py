@@ -1,1 +1,1 @@
-"""Temperature drift of a fibre-optic gyro: what paper 3 does, part by part and as a whole, and a compensator that is trained on other thermal cycles, frozen, and then sees temperature only."""
+"""Temperature drift of a fibre-optic gyro: the parts and the pipeline of paper 3, and a model that is trained on other cycles, frozen, and sees temperature only."""
