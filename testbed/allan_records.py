@@ -14,6 +14,7 @@ from testbed.errors import UnknownNameError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from testbed.scenario import Scenario
     from testbed.signals import FloatArray
 
 
@@ -104,7 +105,6 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         If it is no run folder, the sensor is not in it or its readings have gaps.
     """
     from testbed.loader import load_scenario
-    from testbed.scenario import BASE_RATE_HZ
     from testbed.store import open_run
 
     run = open_run(folder)
@@ -114,8 +114,7 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     records = []
     for name in scenario.sensors if sensor is None else [sensor]:
         instrument = scenario.sensors[name]
-        silent = instrument.model_copy(update={"noise": False}).start(BASE_RATE_HZ, scenario.frame.seed, name)
-        noise = run.sensors[name].rate - silent.process(run.truth[f"{name}_rate"])
+        noise = run.sensors[name].rate - _silent_readings(scenario, name, run.truth[f"{name}_rate"])
         noise = noise[math.ceil(scenario.frame.settle * instrument.sample_rate) :]
         if not np.isfinite(noise).all():
             missing = int(np.sum(~np.isfinite(noise)))
@@ -123,6 +122,18 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         content = f"{name} of {scenario.name}, less its noise-free reading, from {scenario.frame.settle:g} s on"
         records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content))
     return records
+
+
+def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> FloatArray:
+    """Return what a sensor reads of the true rate without noise, level, at the temperature of the run."""
+    from testbed.sensors.base import ExposedStage, Surroundings
+
+    instrument, base = scenario.sensors[name], scenario.base_rate_hz
+    stage = instrument.model_copy(update={"noise": False}).start(base, scenario.frame.seed, name)
+    if not isinstance(stage, ExposedStage):
+        return stage.process(true_rate)
+    temperature = scenario.frame.temperature.at(0, true_rate.size, base)
+    return stage.process_in(true_rate, Surroundings(temperature=temperature))
 
 
 def read_file(

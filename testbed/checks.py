@@ -10,11 +10,11 @@ from testbed.errors import ScenarioError
 from testbed.metrics import METRICS
 from testbed.models.servo import required_torque
 from testbed.models.turntable import check_plant
-from testbed.scenario import BASE_RATE_HZ, Scenario
 from testbed.step_choice import given_step
 
 if TYPE_CHECKING:
     from testbed.document import Document
+    from testbed.scenario import Scenario
 
 _BLOCK = 20_000
 
@@ -37,9 +37,10 @@ def _check_times(scenario: Scenario, document: Document) -> None:
             ("settle",),
             f"expected less than the duration {frame.duration:g} s, got {frame.settle:g} s: no time is left for the metrics",
         )
-    if scenario.n_time < 1 or abs(scenario.n_time / BASE_RATE_HZ - frame.duration) > 1e-9 * frame.duration:
+    base = scenario.base_rate_hz
+    if scenario.n_time < 1 or abs(scenario.n_time / base - frame.duration) > 1e-9 * frame.duration:
         document.find(
-            ("duration",), f"expected a multiple of the base step {1e6 / BASE_RATE_HZ:g} us, got {frame.duration!r} s"
+            ("duration",), f"expected a multiple of the base step {1e6 / base:g} us, got {frame.duration!r} s"
         )
     if frame.detail is not None and not frame.detail[0] < frame.detail[1] <= frame.duration:
         document.find(
@@ -49,12 +50,14 @@ def _check_times(scenario: Scenario, document: Document) -> None:
 
 
 def _check_clocks(scenario: Scenario, document: Document) -> None:
+    base = scenario.base_rate_hz
+    examples = ", ".join(f"{base / n:g} Hz" for n in (1, 2, 4, 5, 10, 20))
     for name, sensor in scenario.sensors.items():
-        ratio = BASE_RATE_HZ / sensor.sample_rate
+        ratio = base / sensor.sample_rate
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 1:
             document.find(
                 ("sensors", name, "sample_rate"),
-                f"expected {BASE_RATE_HZ:g} Hz divided by a whole number (20 kHz, 10 kHz, 5 kHz, 4 kHz, 2 kHz, 1 kHz, ...), got {sensor.sample_rate:g} Hz",
+                f"expected {base:g} Hz divided by a whole number ({examples}, ...), got {sensor.sample_rate:g} Hz",
             )
     rates = sorted({sensor.sample_rate for sensor in scenario.sensors.values()})
     for rate in rates[:-1]:
@@ -75,7 +78,7 @@ def _check_plant(scenario: Scenario, document: Document) -> None:
         document.find(("turntable", "step"), _reasons(error))
         return
     try:
-        check_plant(parameters, BASE_RATE_HZ, step.substeps, step.holds)
+        check_plant(parameters, scenario.base_rate_hz, step.substeps, step.holds)
     except ScenarioError as error:
         document.find(("turntable",), _reasons(error))
 
@@ -151,7 +154,7 @@ def command_peaks(scenario: Scenario) -> tuple[float, float]:
     peak_rate = peak_torque = 0.0
     for start in range(0, scenario.n_time, _BLOCK):
         command = motion.process(min(_BLOCK, scenario.n_time - start))
-        torque = required_torque(scenario.turntable, command, BASE_RATE_HZ)
+        torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
         peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
         peak_torque = max(peak_torque, float(np.max(np.abs(torque))))
     return peak_rate, peak_torque

@@ -34,7 +34,9 @@ def run(
     scenario: ScenarioFile,
     out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/<scenario name>.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")] = None,
-    block: Annotated[float, typer.Option(help="Length of a block in seconds; the result does not depend on it.")] = 1.0,
+    block: Annotated[
+        float | None, typer.Option(help="Length of a block in seconds; the result does not depend on it.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
 ) -> None:
     """Run a scenario, print its errors and write the run folder."""
@@ -42,7 +44,7 @@ def run(
     from testbed.runner import run as run_scenario
     from testbed.terminal import print_metrics, progress
 
-    if not block > 0.0:
+    if block is not None and not block > 0.0:
         problem = f"--block: expected more than 0 s, got {block}"
         raise ScenarioError(problem)
     loaded = load_scenario(scenario)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from testbed.pipeline import RunBlock
 
 _CHUNK = 20_000
-_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s"}
+_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s", "temperature": "K"}
 
 
 class _ShieldedFile(io.FileIO):
@@ -138,5 +138,5 @@ def unit_of(name: str) -> str:
 
 
 def is_sensor_truth(name: str) -> bool:
-    """Return whether a signal is what a sensor's axis feels, named ``<sensor>_rate``."""
-    return name.endswith("_rate") and name != "Q_rate"
+    """Return whether a signal is what a sensor's axis feels, named ``<sensor>_rate``, or its thermal bias, ``<sensor>_drift``."""
+    return name.endswith(("_rate", "_drift")) and name != "Q_rate"

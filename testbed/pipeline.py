@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -10,8 +10,7 @@ import numpy as np
 
 from testbed.errors import RunError
 from testbed.models.turntable import Turntable
-from testbed.scenario import BASE_RATE_HZ, Scenario
-from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings
+from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 from testbed.signals import random_stream
 from testbed.step_choice import choose_step
 
@@ -21,10 +20,13 @@ if TYPE_CHECKING:
     from testbed.fusion import EstimateBlock
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable import TruthBlock
+    from testbed.scenario import Scenario
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
+# Samples: a second at 20 kHz.
+_BLOCK = 20_000
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class RunBlock:
         Estimates by filter.
     profiles : mapping
         By MHD sensor: heights [m], shape (n_height,), and velocity profiles at the pose samples, shape (n_pose, n_height).
+    temperatures, drifts : mapping
+        By sensor with a thermometer inside: its readings [K], as many as of the rate, and the true thermal bias [rad/s].
     """
 
     start: int
@@ -51,6 +55,8 @@ class RunBlock:
     sensors: Mapping[str, FloatArray]
     fusion: Mapping[str, EstimateBlock]
     profiles: Mapping[str, tuple[FloatArray, FloatArray]]
+    temperatures: Mapping[str, FloatArray] = field(default_factory=dict)
+    drifts: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def n_time(self) -> int:
@@ -68,14 +74,14 @@ class Chain:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._motion = scenario.profile()
+        self._motion, base = scenario.profile(), scenario.base_rate_hz
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
         seed, duration = scenario.frame.seed, scenario.frame.duration
         self.step = choose_step(scenario)
         self.turntable = Turntable(
             scenario.turntable,
             mountings,
-            BASE_RATE_HZ,
+            base,
             substeps=self.step.substeps,
             holds=self.step.holds,
             pose_stride=POSE_STRIDE,
@@ -83,17 +89,15 @@ class Chain:
             floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
         )
         self._temperature = scenario.frame.temperature
-        self._sensors = {
-            name: sensor.start(BASE_RATE_HZ, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
-        }
+        self._sensors = {name: sensor.start(base, seed, name) for name, sensor in scenario.sensors.items()}
         rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
         self._fusion = {
             name: spec.factory(spec.belief, rates, spec.parameters) for name, spec in scenario.fusion.items()
         }
         self.rates = {
-            "base": BASE_RATE_HZ,
+            "base": base,
             **rates,
-            **dict.fromkeys(self._fusion, max(rates.values(), default=BASE_RATE_HZ)),
+            **dict.fromkeys(self._fusion, max(rates.values(), default=base)),
         }
 
     def process(self, n_time: int) -> RunBlock:
@@ -106,7 +110,17 @@ class Chain:
             if profile is not None:
                 profiles[name] = profile
         estimates = {name: self._estimate(name, readings) for name in self._fusion}
-        return RunBlock(command.start, command, truth, readings, estimates, profiles)
+        thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
+        return RunBlock(
+            command.start,
+            command,
+            truth,
+            readings,
+            estimates,
+            profiles,
+            temperatures={name: stage.temperature for name, stage in thermal.items()},
+            drifts={name: stage.drift for name, stage in thermal.items()},
+        )
 
     def _estimate(self, name: str, readings: Mapping[str, FloatArray]) -> EstimateBlock:
         """Return the estimate of a filter, which may be a user's own: one value per reading of the fastest sensor."""
@@ -119,11 +133,11 @@ class Chain:
         return estimate
 
     def _around(self, name: str, truth: TruthBlock) -> Surroundings:
-        temperature = self._temperature.at(truth.start, truth.rate.size, BASE_RATE_HZ)
+        temperature = self._temperature.at(truth.start, truth.rate.size, self.rates["base"])
         return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
 
 
-def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[RunBlock]]:
+def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Iterator[RunBlock]]:
     """Return the chain of a scenario and the iterator that runs it.
 
     Parameters
@@ -131,10 +145,10 @@ def simulate(scenario: Scenario, block: float = 1.0) -> tuple[Chain, Iterator[Ru
     scenario : Scenario
         What to run.
     block : float, optional
-        Length of a block [s]; the result does not depend on it.
+        Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = max(round(block * BASE_RATE_HZ), 1)
+    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 

@@ -89,8 +89,13 @@ def columns(block: RunBlock, rates: Mapping[str, float]) -> Iterator[tuple[str, 
     yield "truth", "angle", block.start, base, block.truth.angle
     for name, values in block.truth.sensor_rate.items():
         yield "truth", f"{name}_rate", block.start, base, values
+    for name, values in block.drifts.items():
+        yield "truth", f"{name}_drift", block.start, base, values
     for name, values in block.sensors.items():
-        yield f"sensors/{name}", "rate", first_due(block.start, base, rates[name]), rates[name], values
+        start = first_due(block.start, base, rates[name])
+        yield f"sensors/{name}", "rate", start, rates[name], values
+        if name in block.temperatures:
+            yield f"sensors/{name}", "temperature", start, rates[name], block.temperatures[name]
     for name, estimate in block.fusion.items():
         start = first_due(block.start, base, rates[name])
         for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):

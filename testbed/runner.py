@@ -31,7 +31,7 @@ def run(
     *,
     out: str | Path | None = None,
     seed: int | None = None,
-    block: float = 1.0,
+    block: float | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Run a scenario.
@@ -45,7 +45,7 @@ def run(
     seed : int, optional
         Instead of the scenario's.
     block : float, optional
-        Length of a block [s]; the signals do not depend on it.
+        Length of a block [s], 20 000 samples of the base clock if not given; the signals do not depend on it.
     progress : callable, optional
         Called after every block with the simulated time [s].
 
@@ -61,7 +61,7 @@ def run(
     ScenarioError
         If `out` cannot be written or holds something else.
     """
-    if not block > 0.0:
+    if block is not None and not block > 0.0:
         msg = f"block: expected more than 0 s, got {block!r}"
         raise ValueError(msg)
     scenario = scenario if seed is None else scenario.with_seed(seed)
@@ -70,7 +70,7 @@ def run(
     return _run_to_folder(scenario, Path(out), block, progress)
 
 
-def _run_in_memory(scenario: Scenario, block: float, progress: Progress | None) -> Run:
+def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress | None) -> Run:
     chain, blocks = simulate(scenario, block)
     memory, judge = MemoryStore(chain.rates), Judge(scenario, chain)
     for part in blocks:
@@ -81,7 +81,7 @@ def _run_in_memory(scenario: Scenario, block: float, progress: Progress | None) 
     return assemble(memory.groups(), {**judge.metrics(), "versions": versions()})
 
 
-def _run_to_folder(scenario: Scenario, out: Path, block: float, progress: Progress | None) -> Run:
+def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress: Progress | None) -> Run:
     # The recording's libraries are heavy and of no use to a run in memory.
     from testbed.recording import RecordingWriter
     from testbed.report import write_report

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 from testbed.models.motion import MotionProfile
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
-from testbed.signals import random_stream
+from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.models.turntable import TurntableParameters
     from testbed.sensors.base import Sensor
-
-BASE_RATE_HZ = 20_000.0
 
 
 class Frame(Part):
@@ -114,9 +112,16 @@ class Scenario:
         return self.frame.name
 
     @property
+    def base_rate_hz(self) -> float:
+        """Rate of the base clock [Hz]: 20 kHz, or what the fastest sensor asks for where the base is held and nothing else moves."""
+        if self.turntable.mode != "fixed":
+            return BASE_RATE_HZ
+        return max((sensor.truth_rate for sensor in self.sensors.values()), default=BASE_RATE_HZ)
+
+    @property
     def n_time(self) -> int:
         """Number of samples of the base clock."""
-        return round(self.frame.duration * BASE_RATE_HZ)
+        return round(self.frame.duration * self.base_rate_hz)
 
     @property
     def lines(self) -> tuple[float, ...]:
@@ -142,7 +147,7 @@ class Scenario:
             motion.start(duration, random_stream(seed, "motion", str(i), kind))
             for i, (kind, motion) in enumerate(self.motion)
         ]
-        return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, BASE_RATE_HZ)
+        return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
 
     def with_seed(self, seed: int) -> Scenario:
         """Return the same scenario under another seed."""

@@ -12,6 +12,9 @@ from scipy.linalg import expm
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+# Base clock of a run, unless all its sensors are content with less.
+BASE_RATE_HZ = 20_000.0
+
 
 def sample_times(start: int, n_time: int, sample_rate_hz: float) -> FloatArray:
     """Return k / fs for k = start ... start + n_time - 1 [s]; never an accumulated sum, so it does not drift."""

@@ -11,7 +11,7 @@ from testbed.errors import RunError, ScenarioError
 from testbed.models.motion import MotionProfile
 from testbed.models.servo import required_torque
 from testbed.models.turntable import Turntable
-from testbed.scenario import BASE_RATE_HZ
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from testbed.models.turntable import TruthBlock, TurntableParameters
@@ -41,16 +41,19 @@ class StepChoice:
     error : float or None
         Largest change of a true rate against the base step, over the largest rate [-], as measured on excerpts of the
         scenario; None if the step is not longer than the base step.
+    base_rate_hz : float
+        Base clock [Hz]; another than 20 kHz only where there is no plant.
     """
 
     holds: int = 1
     substeps: int = 1
     error: float | None = None
+    base_rate_hz: float = BASE_RATE_HZ
 
     @property
     def step(self) -> float:
         """Integration step [s]."""
-        return self.holds / self.substeps / BASE_RATE_HZ
+        return self.holds / self.substeps / self.base_rate_hz
 
 
 def choose_step(scenario: Scenario) -> StepChoice:
@@ -71,7 +74,7 @@ def choose_step(scenario: Scenario) -> StepChoice:
     """
     choice = given_step(scenario.turntable)
     if scenario.turntable.mode == "fixed":
-        return StepChoice()
+        return StepChoice(base_rate_hz=scenario.base_rate_hz)
     if choice.holds > 1:
         return replace(choice, error=_Excerpts(scenario).error(choice.holds))
     if scenario.turntable.step != "auto" or not _may_leap(scenario.turntable):

@@ -11,7 +11,7 @@ from testbed.checks import command_peaks
 from testbed.metrics import ErrorMetrics
 from testbed.models.table_modes import coupled_modes
 from testbed.models.turntable import Turntable, TurntableParameters
-from testbed.scenario import BASE_RATE_HZ
+from testbed.signals import BASE_RATE_HZ
 from testbed.step_choice import StepChoice, choose_step, excerpt
 
 if TYPE_CHECKING:
@@ -125,14 +125,14 @@ class TableMetrics:
 
     def __init__(self, scenario: Scenario, step: StepChoice | None = None) -> None:
         self._scenario, self._step = scenario, step
-        self._settle = round(scenario.frame.settle * BASE_RATE_HZ)
+        self._settle = round(scenario.frame.settle * scenario.base_rate_hz)
         self._errors = {name: ErrorMetrics(scenario.lines) for name in ("encoder", "inertial")}
         self._peak = 0.0
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
         first = min(max(self._settle - block.start, 0), block.n_time)
-        t = np.arange(block.start + first, block.start + block.n_time) / BASE_RATE_HZ
+        t = np.arange(block.start + first, block.start + block.n_time) / self._scenario.base_rate_hz
         command = block.command.rate[first:-1]
         self._errors["encoder"].add(t, block.truth.encoder_rate[first:], command)
         self._errors["inertial"].add(t, block.truth.rate[first:], command)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
 
 SENSORS = {
+    "fog": "testbed.sensors.fog:Fog",
     "mems_gyro": "testbed.sensors.mems_gyro:MemsGyro",
     "mhd_ars": "testbed.sensors.mhd_ars:MhdArs",
 }

@@ -10,6 +10,7 @@ import numpy as np
 
 from testbed.models.turntable_parameters import Mounting
 from testbed.parts import Part
+from testbed.signals import BASE_RATE_HZ
 from testbed.units import Frequency
 
 if TYPE_CHECKING:
@@ -69,6 +70,18 @@ class ProfiledStage(SensorStage, Protocol):
         """Return the slip at `heights` [m] as of the last sample that went in [rad/s], shape (n_height,)."""
 
 
+@runtime_checkable
+class ThermalStage(SensorStage, Protocol):
+    """An instrument with a thermometer inside, whose bias follows the temperature; both are of the last block.
+
+    `temperature` holds the thermometer's readings [K], one per reading of the rate; `drift` the true thermal bias [rad/s], one
+    value per sample of the input, which no user of the instrument knows.
+    """
+
+    temperature: FloatArray
+    drift: FloatArray
+
+
 class Sensor(Part):
     """Parameters of an instrument, which is what a scenario's `sensors` entry sets.
 
@@ -106,6 +119,11 @@ class Sensor(Part):
     def exposed(self) -> bool:
         """Whether the readings depend on cross rates or accelerations, which the plant works out for those alone."""
         return False
+
+    @property
+    def truth_rate(self) -> float:
+        """Rate of the truth that it needs on a base that is held [Hz], where nothing moves faster than the command."""
+        return BASE_RATE_HZ
 
     def datasheet(self) -> list[tuple[str, str]]:
         """Return what the parameters mean in data-sheet units: rows of a quantity and its value."""

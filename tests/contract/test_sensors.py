@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from testbed.parts import preset, preset_names, resolve
 from testbed.sensors import SENSORS, load_preset
-from testbed.sensors.base import ExposedStage, Sensor, Surroundings
+from testbed.sensors.base import ExposedStage, Sensor, Surroundings, ThermalStage
 from testbed.units import Quantity
 
 PRESETS = preset_names("testbed.sensors")
@@ -149,6 +149,9 @@ VALUES = {
     "sample_rate": 1000.0,
     "dead_band": 0.005,
     "dropped": 0.2,
+    # A second moves the core of a fibre-optic gyro by millikelvins: no half-width but zero is left.
+    "thermal.half_width": (0.0, 0.0),
+    "thermometer.lag": 1e-3,
     # Blocks that are left out by default; the ring is so small that its Johnson noise shows beside the 18-bit word.
     "scale_factor_error": 0.01,
     "ring": {"width": 1e-4, "radius": 1e-4},
@@ -201,12 +204,13 @@ def with_change(sensor, key, *, change):
 
 
 def output(sensor):
-    """Return readings in rich surroundings, and the response."""
+    """Return readings in rich surroundings, those of a thermometer inside, and the response."""
     rate = np.abs(record())
     around = Surroundings(np.outer(rate, [1, -2]), np.outer(1 + rate, [1, 2, 3]), 310.0 + 100 * rate)
     stage = sensor.start(FS, 1, "sensor")
     readings = stage.process_in(rate, around) if isinstance(stage, ExposedStage) else stage.process(rate)
-    return readings, sensor.response(np.array([1.0, 100.0]))
+    temperature = stage.temperature if isinstance(stage, ThermalStage) else np.empty(0)
+    return readings, temperature, sensor.response(np.array([1.0, 100.0]))
 
 
 @pytest.mark.parametrize(
