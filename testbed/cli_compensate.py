@@ -51,7 +51,7 @@ def _columns(
 def train(
     sources: Sources,
     out: Annotated[Path, typer.Option(help="Model file to write.")] = Path("drift_model.json"),
-    method: Annotated[str, typer.Option(help="Kind of regression; see docs/compensation_models.md.")] = "lssvm",
+    method: Annotated[str, typer.Option(help="Kind of regression; see docs/compensation_models.md.")] = "gradient",
     column: Column = "rate",
     unit: Unit = "deg/h",
     temperature: Temperature = "temperature",

@@ -144,9 +144,7 @@ def gain_figure(audit: Audit) -> Figure:
         axes = figure.subplots()
         axes.axvspan(DRIFT_PERIOD, period[-1] * 1.2, color=SENSORS[3], alpha=0.10, linewidth=0)
         axes.plot([DRIFT_PERIOD, period[-1] * 1.2], [LEAST_GAIN] * 2, color=FILTERS[2], linewidth=1.0)
-        axes.text(
-            DRIFT_PERIOD * 1.05, LEAST_GAIN - 0.02, "below this: a leak", va="top", fontsize=8, color=FILTERS[2]
-        )
+        axes.text(DRIFT_PERIOD * 1.05, LEAST_GAIN - 0.02, "below this: a leak", va="top", fontsize=8, color=FILTERS[2])
         axes.text(DRIFT_PERIOD * 1.05, 0.02, "drift band", fontsize=8, va="bottom")
         if audit.bandwidth_hz is not None:
             fine = np.geomspace(period[0], period[-1], 200)

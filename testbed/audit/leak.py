@@ -103,6 +103,7 @@ class Audit:
 def audit(
     compensate: Compensate,
     record: Record,
+    plain: FloatArray,
     drift: FloatArray | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Audit:
@@ -115,6 +116,8 @@ def audit(
         inside.
     record : Record
         To correct.
+    plain : ndarray, shape (n_time,)
+        Its compensated rate [rad/s].
     drift : ndarray, shape (n_time,), optional
         Its true thermal drift [rad/s], if a simulation knows it.
     tell : callable, optional
@@ -136,8 +139,6 @@ def audit(
         least = 2.0 * next(period for period in PERIODS if period >= DRIFT_PERIOD)
         msg = f"record: expected at least {least:g} s, so that a slow rate can be told from drift, got {record.rate.size / fs:g} s"
         raise ValueError(msg)
-    tell("compensating the record")
-    plain = compensate(record)
     gains, step_gain, earth_gain = _survival(compensate, record, plain, periods, tell)
     tell("fitting Allan curves")
     bandwidth, fitted_to = cutoff(gains), described_to(allan_deviation(record.rate, fs))

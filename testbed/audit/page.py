@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from testbed.audit.leak import Audit
     from testbed.audit.quality import Quality
-    from testbed.compensation.record import Record
     from testbed.signals import FloatArray
+    from testbed.thermal_records import ThermalRecord
 
 
 @dataclass(frozen=True)
@@ -30,26 +30,22 @@ class Audited:
 
     Parameters
     ----------
-    method, name : str
-        Of the compensation and of the record.
-    record : Record
-        What went in.
+    method : str
+        What compensated.
+    thermal : ThermalRecord
+        What went in, with its true drift if a simulation knows it.
     compensated : ndarray, shape (n_time,)
         What came out [rad/s].
     audit : Audit
         The findings.
-    drift : ndarray, shape (n_time,), optional
-        True drift, if known [rad/s].
     extrapolated : float, optional
         Share of samples outside the trained range [-].
     """
 
     method: str
-    name: str
-    record: Record
+    thermal: ThermalRecord
     compensated: FloatArray
     audit: Audit
-    drift: FloatArray | None = None
     extrapolated: float | None = None
 
 
@@ -70,7 +66,7 @@ def write_audit(audited: Audited, folder: Path) -> Path:
     """
     folder.mkdir(parents=True, exist_ok=True)
     figures = summary(audited.audit)
-    about = {"method": audited.method, "record": audited.name, "extrapolated": audited.extrapolated}
+    about = {"method": audited.method, "record": audited.thermal.name, "extrapolated": audited.extrapolated}
     write_text(folder / "audit.json", json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n")
     write_text(folder / "gains.csv", _gains(audited.audit))
     write_text(folder / "allan.csv", _allan(curves(audited.audit)))
@@ -112,15 +108,15 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
-    record = audited.record
+    record = audited.thermal.record
     drawn = {
-        "drift": drift_figure(record, audited.compensated, audited.drift),
+        "drift": drift_figure(record, audited.compensated, audited.thermal.drift),
         "allan": allan_figure(curves(audited.audit)),
         "gain": gain_figure(audited.audit),
     }
     return environment.get_template("audit.html.j2").render(
         method=audited.method,
-        record=audited.name,
+        record=audited.thermal.name,
         hours=record.rate.size / record.sample_rate_hz / 3600.0,
         sample_rate_hz=record.sample_rate_hz,
         audit=figures,

@@ -136,7 +136,8 @@ def test_a_model_survives_json(models, method):
 
 
 @pytest.mark.parametrize(
-    "change", [{"version": 2}, {"format": "other"}, {"machine": {}}, {"method": "magic"}, {"features": {"lags": [-1.0]}}]
+    "change",
+    [{"version": 2}, {"format": "other"}, {"machine": {}}, {"method": "magic"}, {"features": {"lags": [-1.0]}}],
 )
 def test_a_document_that_is_no_model_is_refused(models, change):
     with pytest.raises(ValueError, match=r"drift model|features"):
@@ -164,7 +165,7 @@ def test_extrapolation_is_flagged(models):
     hot = Record(seen.rate, seen.temperature + 10.0, 1.0)
     flagged = models["gradient"].apply(hot).extrapolated
     assert flagged[seen.temperature > seen.temperature.max() - 4.0].all()
-    assert not flagged[: 7200].any()
+    assert not flagged[:7200].any()
 
 
 def test_the_machine_far_outside_falls_back_to_its_bias_and_says_so(models):
