@@ -154,8 +154,10 @@ def gain_figure(audit: Audit) -> Figure:
                 fine, 1.0 / (1.0 + (1.0 / fine / corner) ** 4), color=color, linestyle=line, label="equal low-pass"
             )
         axes.plot(period, gain, "o-", color=FILTERS[0], markersize=4, label="sines")
-        axes.axhline(audit.step_gain, color=INK, linewidth=0.9, linestyle=(0, (5, 2)), label="step")
-        axes.axhline(audit.earth_gain, color=INK, linewidth=0.9, linestyle=(0, (1.2, 1.6)), label="Earth-rate steps")
+        steps = {"step": (audit.step_gain, (0, (5, 2))), "Earth-rate steps": (audit.earth_gain, (0, (1.2, 1.6)))}
+        for label, (share, line) in steps.items():
+            if share is not None:
+                axes.axhline(share, color=INK, linewidth=0.9, linestyle=line, label=label)
         axes.set(xscale="log", xlabel="period of the true rate [s]", ylabel="gain [-]", ylim=(0.0, 1.19))
         axes.set_xlim(period[0] / 1.2, period[-1] * 1.2)
         axes.grid(visible=True)

@@ -51,8 +51,8 @@ class Audit:
         Of the record less its true drift, which only a simulation knows.
     gains : tuple of LineGain
         What survives of sines, by rising period.
-    step_gain, earth_gain : float
-        What survives of a step and of Earth-rate steps [-].
+    step_gain, earth_gain : float or None
+        What survives of a step and of Earth-rate steps [-]; None if the compensation fails on them.
     bandwidth_hz : float or None
         Where short periods begin to be lost [Hz]; None if they are not.
     drift_reduction : float or None
@@ -64,8 +64,8 @@ class Audit:
     low_passed: Quality | None
     oracle: Quality | None
     gains: tuple[LineGain, ...]
-    step_gain: float
-    earth_gain: float
+    step_gain: float | None
+    earth_gain: float | None
     bandwidth_hz: float | None
     drift_reduction: float | None
 
@@ -88,7 +88,9 @@ class Audit:
             if line.period >= DRIFT_PERIOD
         }
         for name, gain in {**slow, "a step": self.step_gain, "Earth-rate steps": self.earth_gain}.items():
-            if gain < LEAST_GAIN:
+            if gain is None:
+                yield f"with {name} added the compensation fails"
+            elif gain < LEAST_GAIN:
                 yield f"of {name} only {gain:.1%} survives, expected at least {LEAST_GAIN:.0%}"
 
     def _better_than_possible(self) -> Iterator[str]:
@@ -157,17 +159,22 @@ def audit(
 
 def _survival(
     compensate: Compensate, record: Record, plain: FloatArray, periods: tuple[float, ...], tell: Callable[[str], None]
-) -> tuple[tuple[LineGain, ...], float, float]:
+) -> tuple[tuple[LineGain, ...], float | None, float | None]:
     """Return what survives of sines, of a step and of Earth-rate steps."""
     t = sample_times(0, record.rate.size, record.sample_rate_hz)
     tell("compensating it with known sines added")
     survived = survivor(compensate, record, plain, sines(t, periods, SIZE))
     gains = line_gains(survived, record.sample_rate_hz, periods, SIZE)
-    shares = []
-    for name, known in (("a known step", step(t, SIZE)), ("Earth-rate steps", earth_turns(t))):
+
+    def share(name: str, known: FloatArray) -> float | None:
         tell(f"compensating it with {name} added")
-        shares.append(pattern_gain(survivor(compensate, record, plain, known), known))
-    return gains, shares[0], shares[1]
+        try:
+            return pattern_gain(survivor(compensate, record, plain, known), known)
+        except ValueError as error:
+            tell(f"it fails: {error}")
+            return None
+
+    return gains, share("a known step", step(t, SIZE)), share("Earth-rate steps", earth_turns(t))
 
 
 def _reduction(drift: FloatArray, rest: FloatArray) -> float:

@@ -94,3 +94,17 @@ def test_the_audit_says_what_it_is_doing(cycle):
     said = []
     examine(lambda of: of.rate, record, tell=said.append)
     assert len(said) == 4
+
+
+def test_a_compensation_that_fails_on_a_true_rate_is_refused(cycle):
+    record, _ = cycle
+
+    def picky(of):
+        if np.abs(of.rate).max() > DEG_H:
+            msg = "rate: expected a gyro at rest"
+            raise ValueError(msg)
+        return of.rate
+
+    found = examine(picky, record)
+    assert found.earth_gain is None
+    assert found.leaks == ("with Earth-rate steps added the compensation fails",)
