@@ -11,8 +11,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-PAPERS = {"paper1": "testbed.reproduce.paper1", "paper2": "testbed.reproduce.paper2"}
-PLANNED = ("paper3",)
+PAPERS = {
+    "paper1": "testbed.reproduce.paper1",
+    "paper2": "testbed.reproduce.paper2",
+    "paper3": "testbed.reproduce.paper3",
+}
 
 
 def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:
@@ -35,11 +38,11 @@ def run_paper(name: str, seeds: int, out: Path) -> Iterator[str]:
     Raises
     ------
     ScenarioError
-        If there is no such paper, or not yet, or the folder cannot be written.
+        If there is no such paper, or the folder cannot be written.
     """
     if name not in PAPERS:
         known = f"there is: {', '.join(PAPERS)}"
-        problem = f"{name}: not yet, {known}" if name in PLANNED else f"{name}: unknown paper, {known}"
+        problem = f"{name}: unknown paper, {known}"
         raise ScenarioError(problem)
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -109,7 +109,7 @@ def test_noise_is_referred_to_the_rate_by_the_response() -> None:
 
 
 def test_only_what_exists_is_promised(tmp_path: Path) -> None:
-    for name, message in (("paper3", "not yet, there is: paper1, paper2"), ("paper9", "unknown paper")):
+    for name, message in (("paper9", "unknown paper, there is: paper1, paper2, paper3"),):
         with pytest.raises(ScenarioError, match=message):
             list(run_paper(name, 1, tmp_path))
     taken = tmp_path / "file"

@@ -1,0 +1,126 @@
+"""The folder of an audit: audit.json, the curves as CSV, and a page to read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from testbed.audit.figures import allan_figure, drift_figure, gain_figure
+from testbed.audit.summary import DEG_H, summary
+from testbed.report.numbers import fixed, plain, significant
+from testbed.report.svg import svg_text
+from testbed.store import write_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from testbed.audit.leak import Audit
+    from testbed.audit.quality import Quality
+    from testbed.signals import FloatArray
+    from testbed.thermal_records import ThermalRecord
+
+
+@dataclass(frozen=True)
+class Audited:
+    """An audit and what it was of.
+
+    Parameters
+    ----------
+    method : str
+        What compensated.
+    thermal : ThermalRecord
+        What went in, with its true drift if a simulation knows it.
+    compensated : ndarray, shape (n_time,)
+        What came out [rad/s].
+    audit : Audit
+        The findings.
+    extrapolated : float, optional
+        Share of samples outside the trained range [-].
+    """
+
+    method: str
+    thermal: ThermalRecord
+    compensated: FloatArray
+    audit: Audit
+    extrapolated: float | None = None
+
+
+def write_audit(audited: Audited, folder: Path) -> Path:
+    """Write audit.json, allan.csv, gains.csv and audit.html, each whole or not at all.
+
+    Parameters
+    ----------
+    audited : Audited
+        To write.
+    folder : Path
+        Made if it does not exist.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    figures = summary(audited.audit)
+    about = {"method": audited.method, "record": audited.thermal.name, "extrapolated": audited.extrapolated}
+    write_text(folder / "audit.json", json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n")
+    write_text(folder / "gains.csv", _gains(audited.audit))
+    write_text(folder / "allan.csv", _allan(curves(audited.audit)))
+    write_text(folder / "audit.html", _page(audited, figures))
+    return folder / "audit.html"
+
+
+def curves(audit: Audit) -> dict[str, Quality]:
+    """Return the qualities of an audit that are known, by the name of their curve."""
+    named = {
+        "record": audit.before,
+        "compensated": audit.after,
+        "equal low-pass": audit.low_passed,
+        "oracle": audit.oracle,
+    }
+    return {name: quality for name, quality in named.items() if quality is not None}
+
+
+def _gains(audit: Audit) -> str:
+    rows = [f"{line.period!r},{line.gain!r},{line.phase!r}" for line in audit.gains]
+    return "\n".join(["period_s,gain,phase_rad", *rows]) + "\n"
+
+
+def _allan(qualities: dict[str, Quality]) -> str:
+    rows = ["record,tau_s,deviation_deg_h,lower_deg_h,upper_deg_h"]
+    for name, quality in qualities.items():
+        curve = quality.curve
+        columns = zip(curve.tau, curve.deviation / DEG_H, curve.lower / DEG_H, curve.upper / DEG_H, strict=True)
+        rows += [f"{name},{tau:.9g},{middle:.9g},{low:.9g},{high:.9g}" for tau, middle, low, high in columns]
+    return "\n".join(rows) + "\n"
+
+
+def _page(audited: Audited, figures: dict[str, object]) -> str:
+    environment = Environment(
+        loader=PackageLoader("testbed.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
+    record = audited.thermal.record
+    drawn = {
+        "drift": drift_figure(record, audited.compensated, audited.thermal.drift),
+        "allan": allan_figure(curves(audited.audit)),
+        "gain": gain_figure(audited.audit),
+    }
+    return environment.get_template("audit.html.j2").render(
+        method=audited.method,
+        record=audited.thermal.name,
+        hours=record.rate.size / record.sample_rate_hz / 3600.0,
+        sample_rate_hz=record.sample_rate_hz,
+        audit=figures,
+        extrapolated=audited.extrapolated,
+        # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
+        figures={name: Markup(svg_text(figure, name)) for name, figure in drawn.items()},
+    )
