@@ -188,12 +188,15 @@ def update_plain(x, P, H, i, z, R, g, K, n):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def triangularise(A, n, m):  # pragma: no cover
-    """Bring A (n, m) to lower triangular form by Householder reflections from the right (the QR of A'), which leaves A A' as it is."""
+def triangularise(A, n, width):  # pragma: no cover
+    """Bring A (n, n + width - 1) to lower triangular form by Householder reflections from the right, which leaves A A' as it is.
+
+    Row i must be zero from column i + width on.
+    """
     zero = A.dtype.type(0.0)
     for i in range(n):
         square = zero
-        for k in range(i + 1, m):
+        for k in range(i + 1, i + width):
             square += A[i, k] * A[i, k]
         if square == zero:
             continue
@@ -205,19 +208,19 @@ def triangularise(A, n, m):  # pragma: no cover
         A[i, i] = head
         for j in range(i + 1, n):
             total = zero
-            for k in range(i, m):
+            for k in range(i, i + width):
                 total += A[j, k] * A[i, k]
             total /= scale
-            for k in range(i, m):
+            for k in range(i, i + width):
                 A[j, k] -= total * A[i, k]
         A[i, i] = diagonal
-        for k in range(i + 1, m):
+        for k in range(i + 1, i + width):
             A[i, k] = zero
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
-    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'."""
+    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'; S is lower triangular."""
     move(x, F, moved, n)
     for i in range(n):
         for j in range(n):
@@ -226,7 +229,7 @@ def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
         for k in range(1, n):
             for j in range(n):
                 array[i, j] += F[i, k] * D[k, j]
-    triangularise(array, n, 2 * n)
+    triangularise(array, n, n + 1)
     for i in range(n):
         for j in range(n):
             D[i, j] = array[i, j]
@@ -290,19 +293,38 @@ def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def update_root(D, G, K, R, array, n, n_sensor):  # pragma: no cover
-    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K' by the QR of [(I - K H)D, K R^(1/2)]'."""
-    for i in range(n):
-        for j in range(n):
-            array[i, j] = D[i, j]
-        for k in range(n_sensor):
+def update_root(D, G, K, R, due, n, n_sensor):  # pragma: no cover
+    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K', G = H D, by reflections of [(I - K H)D, K R^(1/2)] from the right.
+
+    Its null vectors are known, the rows of [-G, R^(1/2)]: one reflection for each reading turns them into the last columns, which then are
+    zero. D does not stay triangular; G is used up.
+    """
+    for i in range(n_sensor):
+        if due[i]:
             for j in range(n):
-                array[i, j] -= K[i, k] * G[k, j]
-            array[i, n + k] = K[i, k] * np.sqrt(R[k])
-    triangularise(array, n, n + n_sensor)
-    for i in range(n):
-        for j in range(n):
-            D[i, j] = array[i, j]
+                for k in range(n):
+                    D[j, k] -= K[j, i] * G[i, k]
+    for i in range(n_sensor):
+        if due[i]:
+            square, root = R[i], np.sqrt(R[i])
+            for k in range(n):
+                square += G[i, k] * G[i, k]
+            tip = root + np.sqrt(square)
+            scale = tip * (tip - root)
+            for j in range(n):
+                total = K[j, i] * root * tip
+                for k in range(n):
+                    total -= D[j, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    D[j, k] += total * G[i, k]
+            for m in range(i + 1, n_sensor):
+                total = D.dtype.type(0.0)
+                for k in range(n):
+                    total += G[m, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    G[m, k] -= total * G[i, k]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -364,7 +386,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:
                 # Sent out first: in hardware the covariance has until the next reading.
                 out[RATE, k] = x[0]
                 if read:
-                    update_root(P, G, gain, R, array, n, n_sensor)
+                    update_root(P, G, gain, R, due, n, n_sensor)
                 out[STD, k] = np.sqrt(row_square(P, 0, n))
             else:
                 for i in range(n_sensor):
@@ -810,7 +832,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
                 # Sent out first: in hardware the covariance has until the next reading.
                 out[RATE, k] = x[0]
-                update_root(P, G, gain, R, array, n, n_sensor)
+                update_root(P, G, gain, R, due, n, n_sensor)
             hits = 0
             for i in range(n_sensor):
                 if due[i]:
