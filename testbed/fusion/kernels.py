@@ -584,13 +584,28 @@ def weigh(score, weight, M):  # pragma: no cover
         weight[m] /= total
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def start_again(x, P, score, restart, n, M):  # pragma: no cover
+    """Give the filters slower than the best one, and by exp(-restart) less likely, its state and covariance; `score` ends at 0."""
+    best = 0
+    for m in range(1, M):
+        if score[m] > score[best]:
+            best = m
+    for m in range(best):
+        if score[m] < -restart:
+            for j in range(n):
+                x[j, m] = x[j, best]
+                for k in range(n):
+                    P[j, k, m] = P[j, k, best]
+
+
 @functools.lru_cache
 def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
     """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters over a block.
 
     They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M). `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the
     columns of F and H that are not zero, their number last. `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 4) as
-    in `admit`, `setting` = [started, forget, gate, patience, stuck_after], `levels` (M,) what the weights average into the row LEVEL.
+    in `admit`, `setting` = [started, forget, gate, patience, stuck_after, restart], `levels` (M,) what the weights average into the row LEVEL.
     """
 
     @njit(cache=True, error_model="numpy")
@@ -637,6 +652,7 @@ def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
                             score[m] += log_likelihood(e[m], spread[m] + R[i], gate)
                         update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
                 weigh(score, weight, M)
+                start_again(x, P, score, setting[5], n, M)
             rate, variance, level = 0.0, 0.0, 0.0
             for m in range(M):
                 rate += weight[m] * x[0, m]

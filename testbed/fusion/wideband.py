@@ -44,6 +44,8 @@ class WidebandParameters(FilterParameters):
         Number of filters, their q evenly spaced in logarithm.
     memory : float
         Time constant with which old readings lose their say on the weights [s]; 50 ms is a factor of 0.999 per sample at 20 kHz.
+    restart : float
+        A filter slower than the most likely one, and by the factor exp(-restart) less likely, starts again from that one's state.
     gate : float
         A reading is refused if even the filter least surprised by it finds it that many standard deviations off.
     patience : int
@@ -58,6 +60,7 @@ class WidebandParameters(FilterParameters):
     decades: Annotated[float, Field(gt=0.0, le=30.0)] = 15.0
     filters: Annotated[int, Field(ge=2, le=32)] = 16
     memory: PositiveDuration = 0.05
+    restart: Annotated[float, Field(gt=0.0)] = 20.0
     gate: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
     patience: Annotated[int, Field(ge=0)] = 10
     stuck_after: Annotated[int, Field(ge=0)] = 10
@@ -69,8 +72,9 @@ class Wideband(BlockFilter):
     .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
         \hat x = \sum w_i \hat x_i, \quad P = \sum w_i (P_i + (\hat x_i - \hat x)^2)
 
-    with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run side by side and never
-    exchange state: they differ in how fast a signal they expect. A square beyond gate^2 counts by its logarithm. No band, no threshold on
+    with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run side by side and
+    differ in how fast a signal they expect. One that is too slow for the signal spoils its slow states, which take half a minute to
+    recover: it is given state and covariance of the best filter until it does better. A square beyond gate^2 counts by its logarithm. No band, no threshold on
     the signal. Refused readings (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the
     weighted mean of log10 q [rad^2/s^(2m+1)].
 
@@ -104,7 +108,7 @@ class Wideband(BlockFilter):
         self._score = np.zeros(q.size)
         self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
         forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
-        self._setting = np.array([0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after])
+        self._setting = np.array([0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart])
         self._columns = _columns(self.model.F), _columns(self.model.H)
         self._run = bank_kernel(len(self._x), self._R.size, q.size)
 
