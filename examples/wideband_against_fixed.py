@@ -134,7 +134,9 @@ def judge(label: str, seeds: Sequence[int], duration: float) -> Judgement:
 
 def against_fixed(labels: Sequence[str], seeds: Sequence[int], duration: float, target: Path | None) -> None:
     """Print a line per signal, and write them to a file."""
-    print(f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, {duration:g} s")
+    print(
+        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, {duration:g} s"
+    )
     rows = []
     for label in labels:
         row = judge(label, seeds, duration)
@@ -184,7 +186,9 @@ MISMATCH_AT = {0.5: 2, 10.0: 10, 100.0: 13}
 
 def under_mismatch(seeds: Sequence[int]) -> None:
     """Print what 5 % of belief error costs: promised are at most 1.3 sqrt(ideal^2 + forced^2)."""
-    print("belief off by 5 %            at Hz  ideal    forced   error    largest ratio   deg/s, medians; error / sqrt(ideal^2 + forced^2)")
+    print(
+        "belief off by 5 %            at Hz  ideal    forced   error    largest ratio   deg/s, medians; error / sqrt(ideal^2 + forced^2)"
+    )
     for sensor in SENSORS:
         for change in ({"gain": 1.05}, {"gain": 0.95}, {"corner": 1.05}, {"corner": 0.95}):
             ((key, factor),) = change.items()
@@ -227,7 +231,9 @@ def change_errors(label: str, seed: int, duration: float = 10.0) -> tuple[float,
 
 def under_change(seeds: Sequence[int]) -> None:
     """Print what a change in the middle of the run costs: promised are at most 1.3 times the error without it."""
-    print(f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after the change on")
+    print(
+        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after the change on"
+    )
     for label in CHANGES:
         real, ideal, peak = np.array([change_errors(label, seed) for seed in seeds]).T
         worst = float(np.max(real / ideal))

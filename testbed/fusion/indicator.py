@@ -135,7 +135,7 @@ class _Energies:
         n = z.size - self._past.size
         means = np.empty((2, len(self.lags), n))
         for i, (lag, noise) in enumerate(zip(self.lags, self._noise, strict=True)):
-            pair = energies(z[-n - 3 * lag :] if n else z[:0], lag) if n else (z[:0], z[:0])
+            pair = energies(z[self._past.size - 3 * lag :], lag)
             there = np.isfinite(pair[0]) & np.isfinite(pair[1])
             weight = self._fade(i, 2, there.astype(float))
             for j in range(2):
@@ -225,9 +225,7 @@ class FrequencyIndicator:
         for i in range(len(LAGS_S)):
             both = (used == i) & (slow[i] > 0.0) & (fast[i] > 0.0)
             ratio[both] = fast[i][both] / slow[i][both]
-        by_sensors = np.exp(
-            np.interp(np.log(ratio), self._log_ratio, self._log_freq, left=np.nan, right=np.nan)
-        )
+        by_sensors = np.exp(np.interp(np.log(ratio), self._log_ratio, self._log_freq, left=np.nan, right=np.nan))
         return FrequencyBlock({name: freq for name, (_, freq) in chosen.items()}, by_sensors)
 
 

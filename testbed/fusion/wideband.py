@@ -108,7 +108,9 @@ class Wideband(BlockFilter):
         self._score = np.zeros(q.size)
         self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
         forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
-        self._setting = np.array([0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart])
+        self._setting = np.array(
+            [0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart]
+        )
         self._columns = _columns(self.model.F), _columns(self.model.H)
         self._run = bank_kernel(len(self._x), self._R.size, q.size)
 
