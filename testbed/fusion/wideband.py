@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FilterParameters
+from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FormParameters
 from testbed.fusion.kernels import (
     BANK_HEADER_ROWS,
     BANK_ROWS,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 
-class WidebandParameters(FilterParameters):
+class WidebandParameters(FormParameters):
     """Parameters of `Wideband`; q, here the lowest of the bank, is 1e4 (deg/s)^2/s^5 for order 3.
 
     Parameters
@@ -101,7 +101,7 @@ class Wideband(BlockFilter):
         super().__init__(belief, sample_rate_hz, parameters)
         q = parameters.q * np.logspace(0.0, parameters.decades, parameters.filters)
         self._R = self.measurement_noise("R", {}, explicit=False)
-        self._Q = _noise_of_bank(belief, sample_rate_hz, parameters, q)
+        self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
         self._levels = np.log10(q)
         self._x = np.zeros((self._x.size, q.size))
         self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
@@ -112,7 +112,19 @@ class Wideband(BlockFilter):
             [0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart]
         )
         self._columns = _columns(self.model.F), _columns(self.model.H)
-        self._run = bank_kernel(len(self._x), self._R.size, q.size)
+        self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form)
+
+    def _noise_of_bank(
+        self,
+        belief: Mapping[str, SensorBelief],
+        sample_rate_hz: Mapping[str, float],
+        parameters: WidebandParameters,
+        q: FloatArray,
+    ) -> FloatArray:
+        """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
+        order, use = parameters.order, parameters.use_input_noise
+        models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
+        return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
         """Filter the next block.
@@ -144,18 +156,6 @@ class Wideband(BlockFilter):
             diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
             diagnostics[f"refused_{name}"] = out[row + REFUSED]
         return EstimateBlock(out[RATE], out[STD], diagnostics)
-
-
-def _noise_of_bank(
-    belief: Mapping[str, SensorBelief],
-    sample_rate_hz: Mapping[str, float],
-    parameters: WidebandParameters,
-    q: FloatArray,
-) -> FloatArray:
-    """Return Q of each filter, shape (n_state, n_state, n_filter)."""
-    order, use = parameters.order, parameters.use_input_noise
-    models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
-    return np.ascontiguousarray(np.stack([model.Q for model in models], axis=2))
 
 
 def _columns(matrix: FloatArray) -> np.ndarray:
