@@ -121,13 +121,18 @@ def main() -> None:
     reference = filterpy_run(model, few)
     peer = best(lambda: filterpy_run(model, few), 3) / few.shape[1] * 1e6
     both = np.nan_to_num(few[:, :1000])
-    root_peer, bank_peer = filterpy_us("SquareRootKalmanFilter", model, both), 16 * filterpy_us("KalmanFilter", order_3, both)
+    root_peer, bank_peer = (
+        filterpy_us("SquareRootKalmanFilter", model, both),
+        16 * filterpy_us("KalmanFilter", order_3, both),
+    )
     scale = np.abs(out_c[0]).max()
     print(f"largest difference, relative: C {np.abs(out[0] - out_c[0]).max() / scale:.1e}, ", end="")
     print(f"filterpy {np.abs(out[0, : reference.size] - reference).max() / scale:.1e}")
     print(f"ours (kernel) {ours_us:.3f} us/step, {ours_us / plain_c:.2f} of C (promised: at most 1.5)", end="")
     print(f", filterpy {peer / ours_us:.0f} times ours (promised: at least 150)")
-    print(f"{'filter, with blocks':20s} {'us/step':>9}{'C':>8}{'filterpy':>10}{'/ kalman':>10}{'real time':>11}   promised")
+    print(
+        f"{'filter, with blocks':20s} {'us/step':>9}{'C':>8}{'filterpy':>10}{'/ kalman':>10}{'real time':>11}   promised"
+    )
     blocks = {"mems_gyro": Z[0, ::10].copy(), "mhd_ars": Z[1].copy()}
     plain_us = 0.0
     for name, target in FILTERS.items():

@@ -649,7 +649,7 @@ def innovate_root_bank(x, D, h, seen, z, e, spread, g, n, M):  # pragma: no cove
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def update_root_bank(x, D, R, e, spread, g, total, n, M):  # pragma: no cover
+def update_root_bank(x, D, R, e, spread, g, total, n, M):  # noqa: PLR0912  # pragma: no cover
     """Apply the reading behind (e, spread, g) of `innovate_root_bank` to M filters, as `update_root` does."""
     root = np.sqrt(R)
     for j in range(n):
@@ -741,7 +741,7 @@ def start_again(x, P, score, restart, n, M):  # pragma: no cover
 
 
 @functools.lru_cache
-def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:
+def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters over a block.
 
     They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots. `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the

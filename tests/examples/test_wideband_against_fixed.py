@@ -63,7 +63,7 @@ def test_changed_beliefs_are_off_by_what_is_said() -> None:
 def test_a_wrong_belief_costs_what_it_forces(sensor: str, key: str, factor: float) -> None:
     """At most 1.3 sqrt(ideal^2 + forced^2), 5 % of scale factor or corner, both signs, both sensors; 10 Hz, where both count."""
     wrong = example.BELIEF | {sensor: example.changed(example.BELIEF[sensor], **{key: factor})}
-    error, ideal, forced = example.mismatch_ratios(10.0, example.MISMATCH_AT[10.0], wrong, (31, 32), 3.0).T
+    error, ideal, forced = example.mismatch_ratios(10.0, example.MISMATCH_AT[10.0], wrong, (31, 32), 2.0).T
     assert np.all(error <= 1.3 * np.hypot(ideal, forced))
 
 
