@@ -211,6 +211,6 @@ def covariance_root(P: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(P / np.outer(scale, scale))
     # Symmetric before the QR, so that a diagonal P has a diagonal root.
     symmetric = vectors * np.sqrt(np.clip(values, 0.0, None)) @ vectors.T
-    triangle = np.linalg.qr(symmetric, mode="r").T
+    triangle = np.asarray(np.linalg.qr(symmetric, mode="r")).T
     root: FloatArray = scale[:, None] * triangle * np.where(np.diag(triangle) < 0.0, -1.0, 1.0)
     return root
