@@ -109,7 +109,7 @@ class FilterParameters(Part):
         return f"{value!r} {signal_noise_unit(self.order)}" if (info.context or {}).get("border") else value
 
 
-class CovarianceParameters(FilterParameters):
+class FormParameters(FilterParameters):
     """Parameters of a filter whose covariance recursion can be chosen.
 
     Parameters
@@ -117,11 +117,20 @@ class CovarianceParameters(FilterParameters):
     form : {"joseph", "conventional", "square_root"}
         What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite, to show it;
         or a root D of P = D D' by QR decompositions.
+    """
+
+    form: Literal["joseph", "conventional", "square_root"] = "joseph"
+
+
+class CovarianceParameters(FormParameters):
+    """Parameters of a filter whose covariance recursion and its arithmetic can be chosen.
+
+    Parameters
+    ----------
     precision : {"double", "single"}
         Arithmetic of the state and covariance recursion.
     """
 
-    form: Literal["joseph", "conventional", "square_root"] = "joseph"
     precision: Literal["double", "single"] = "double"
 
 
@@ -146,9 +155,8 @@ class BlockFilter:
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: FilterParameters
     ) -> None:
-        form, precision = "joseph", "double"
-        if isinstance(parameters, CovarianceParameters):
-            form, precision = parameters.form, parameters.precision
+        form = parameters.form if isinstance(parameters, FormParameters) else "joseph"
+        precision = parameters.precision if isinstance(parameters, CovarianceParameters) else "double"
         self.model: FusionModel = build_model(
             belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
         )

@@ -204,12 +204,15 @@ def update_plain(x, P, H, i, z, R, g, K, n):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def triangularise(A, n, m):  # pragma: no cover
-    """Bring A (n, m) to lower triangular form by Householder reflections from the right (the QR of A'), which leaves A A' as it is."""
+def triangularise(A, n, width):  # pragma: no cover
+    """Bring A (n, n + width - 1) to lower triangular form by Householder reflections from the right, which leaves A A' as it is.
+
+    Row i must be zero from column i + width on.
+    """
     zero = A.dtype.type(0.0)
     for i in range(n):
         square = zero
-        for k in range(i + 1, m):
+        for k in range(i + 1, i + width):
             square += A[i, k] * A[i, k]
         if square == zero:
             continue
@@ -221,19 +224,19 @@ def triangularise(A, n, m):  # pragma: no cover
         A[i, i] = head
         for j in range(i + 1, n):
             total = zero
-            for k in range(i, m):
+            for k in range(i, i + width):
                 total += A[j, k] * A[i, k]
             total /= scale
-            for k in range(i, m):
+            for k in range(i, i + width):
                 A[j, k] -= total * A[i, k]
         A[i, i] = diagonal
-        for k in range(i + 1, m):
+        for k in range(i + 1, i + width):
             A[i, k] = zero
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
-    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'."""
+    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'; S is lower triangular."""
     move(x, F, moved, n)
     for i in range(n):
         for j in range(n):
@@ -242,7 +245,7 @@ def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
         for k in range(1, n):
             for j in range(n):
                 array[i, j] += F[i, k] * D[k, j]
-    triangularise(array, n, 2 * n)
+    triangularise(array, n, n + 1)
     for i in range(n):
         for j in range(n):
             D[i, j] = array[i, j]
@@ -306,19 +309,38 @@ def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def update_root(D, G, K, R, array, n, n_sensor):  # pragma: no cover
-    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K' by the QR of [(I - K H)D, K R^(1/2)]'."""
-    for i in range(n):
-        for j in range(n):
-            array[i, j] = D[i, j]
-        for k in range(n_sensor):
+def update_root(D, G, K, R, due, n, n_sensor):  # noqa: PLR0912  # pragma: no cover
+    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K', G = H D, by reflections of [(I - K H)D, K R^(1/2)] from the right.
+
+    Its null vectors are known, the rows of [-G, R^(1/2)]: one reflection for each reading turns them into the last columns, which then are
+    zero. D does not stay triangular; G is used up.
+    """
+    for i in range(n_sensor):
+        if due[i]:
             for j in range(n):
-                array[i, j] -= K[i, k] * G[k, j]
-            array[i, n + k] = K[i, k] * np.sqrt(R[k])
-    triangularise(array, n, n + n_sensor)
-    for i in range(n):
-        for j in range(n):
-            D[i, j] = array[i, j]
+                for k in range(n):
+                    D[j, k] -= K[j, i] * G[i, k]
+    for i in range(n_sensor):
+        if due[i]:
+            square, root = R[i], np.sqrt(R[i])
+            for k in range(n):
+                square += G[i, k] * G[i, k]
+            tip = root + np.sqrt(square)
+            scale = tip * (tip - root)
+            for j in range(n):
+                total = K[j, i] * root * tip
+                for k in range(n):
+                    total -= D[j, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    D[j, k] += total * G[i, k]
+            for m in range(i + 1, n_sensor):
+                total = D.dtype.type(0.0)
+                for k in range(n):
+                    total += G[m, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    G[m, k] -= total * G[i, k]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -385,7 +407,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PL
                 # Sent out first: in hardware the covariance has until the next reading.
                 out[RATE, k] = x[0]
                 if read:
-                    update_root(P, G, gain, R, array, n, n_sensor)
+                    update_root(P, G, gain, R, due, n, n_sensor)
                 out[STD, k] = np.sqrt(row_square(P, 0, n))
             else:
                 for i in range(n_sensor):
@@ -455,10 +477,11 @@ def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912  # pragma: no cover
+def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form):  # noqa: PLR0912  # pragma: no cover
     """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
 
-    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double precision.
+    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double precision. In JOSEPH form
+    one half of P is computed and copied, in CONVENTIONAL every element is computed for itself.
     """
     for m in range(M):
         lost[m] = P[0, 0, m] > LOST_VARIANCE
@@ -478,7 +501,7 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912
     for i in range(n):
         for m in range(M):
             x[i, m] = x[i, m] if lost[m] else moved[i, m]
-        for j in range(i + 1):
+        for j in range(n if form == CONVENTIONAL else i + 1):
             for m in range(M):
                 moved[i, m] = Q[i, j, m]
             for s in range(nonzero[j, n]):
@@ -488,7 +511,8 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M):  # noqa: PLR0912
                     moved[i, m] += factor * work[i, k, m]
             for m in range(M):
                 P[i, j, m] = P[i, j, m] if lost[m] else moved[i, m]
-                P[j, i, m] = P[i, j, m]
+                if form != CONVENTIONAL:
+                    P[j, i, m] = P[i, j, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -537,6 +561,145 @@ def update_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
+def update_plain_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_bank` to M filters, in the short form of `update_plain`."""
+    for j in range(n):
+        for m in range(M):
+            K[j, m] = g[j, m] / (spread[m] + R)
+            x[j, m] += K[j, m] * e[m]
+    for k in range(n):
+        for m in range(M):
+            g[k, m] = 0.0
+        for s in range(seen[n]):
+            j = seen[s]
+            for m in range(M):
+                g[k, m] += h[j] * P[j, k, m]
+    for j in range(n):
+        for k in range(n):
+            for m in range(M):
+                P[j, k, m] -= K[j, m] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def triangularise_bank(A, n, width, scale, total, M):  # noqa: PLR0912  # pragma: no cover
+    """Do what `triangularise` does to M matrices side by side, A (n, n + width - 1, M)."""
+    for i in range(n):
+        for m in range(M):
+            scale[m] = 0.0
+        for k in range(i + 1, i + width):
+            for m in range(M):
+                scale[m] += A[i, k, m] * A[i, k, m]
+        for m in range(M):
+            length = np.sqrt(scale[m] + A[i, i, m] * A[i, i, m])
+            head = A[i, i, m] + length if A[i, i, m] > 0.0 else A[i, i, m] - length
+            scale[m] = 0.5 * (head * head + scale[m])
+            # A row of zeros reflects nothing.
+            scale[m] = scale[m] if scale[m] > 0.0 else 1.0
+            A[i, i, m] = head
+        for j in range(i + 1, n):
+            for m in range(M):
+                total[m] = 0.0
+            for k in range(i, i + width):
+                for m in range(M):
+                    total[m] += A[j, k, m] * A[i, k, m]
+            for m in range(M):
+                total[m] /= scale[m]
+            for k in range(i, i + width):
+                for m in range(M):
+                    A[j, k, m] -= total[m] * A[i, k, m]
+        for m in range(M):
+            # The scale is the head times the new diagonal, but for the sign.
+            A[i, i, m] = -scale[m] / A[i, i, m] if A[i, i, m] != 0.0 else 0.0
+        for k in range(i + 1, i + width):
+            for m in range(M):
+                A[i, k, m] = 0.0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_root_bank(x, D, F, nonzero, S, array, moved, scale, total, lost, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Do what `predict_bank` does to roots, by the QR of [F D, S]'; S is lower triangular."""
+    for m in range(M):
+        total[m] = 0.0
+    for k in range(n):
+        for m in range(M):
+            total[m] += D[0, k, m] * D[0, k, m]
+    for m in range(M):
+        lost[m] = total[m] > LOST_VARIANCE
+    for i in range(n):
+        for m in range(M):
+            moved[i, m] = 0.0
+        for j in range(n):
+            for m in range(M):
+                array[i, j, m] = 0.0
+                array[i, n + j, m] = S[i, j, m]
+        for s in range(nonzero[i, n]):
+            k = nonzero[i, s]
+            factor = F[i, k]
+            for m in range(M):
+                moved[i, m] += factor * x[k, m]
+            for j in range(n):
+                for m in range(M):
+                    array[i, j, m] += factor * D[k, j, m]
+    triangularise_bank(array, n, n + 1, scale, total, M)
+    for i in range(n):
+        for m in range(M):
+            x[i, m] = x[i, m] if lost[m] else moved[i, m]
+        for j in range(n):
+            for m in range(M):
+                D[i, j, m] = D[i, j, m] if lost[m] else array[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovate_root_bank(x, D, h, seen, z, e, spread, g, n, M):  # pragma: no cover
+    """Set e = z - h x, g = D' h' and spread = |g|^2 of each of M filters; `seen` lists where h is not zero."""
+    for m in range(M):
+        e[m] = z
+        spread[m] = 0.0
+    for s in range(seen[n]):
+        k = seen[s]
+        for m in range(M):
+            e[m] -= h[k] * x[k, m]
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = 0.0
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += h[k] * D[k, j, m]
+        for m in range(M):
+            spread[m] += g[j, m] * g[j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_root_bank(x, D, R, e, spread, g, total, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_root_bank` to M filters, as `update_root` does."""
+    root = np.sqrt(R)
+    for j in range(n):
+        for m in range(M):
+            total[m] = 0.0
+        for k in range(n):
+            for m in range(M):
+                total[m] += D[j, k, m] * g[k, m]
+        for m in range(M):
+            total[m] /= spread[m] + R
+            x[j, m] += total[m] * e[m]
+        for k in range(n):
+            for m in range(M):
+                D[j, k, m] -= total[m] * g[k, m]
+        for m in range(M):
+            total[m] *= root * (root + np.sqrt(spread[m] + R))
+        for k in range(n):
+            for m in range(M):
+                total[m] -= D[j, k, m] * g[k, m]
+        for m in range(M):
+            length = np.sqrt(spread[m] + R)
+            total[m] /= length * (length + root)
+        for k in range(n):
+            for m in range(M):
+                D[j, k, m] += total[m] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
 def admit(watch, z, smallest, gate, patience, stuck_after):  # pragma: no cover
     """Return whether a reading is to be used; `watch` = [last reading, equal ones before it, refused in a row, refused so far].
 
@@ -581,28 +744,46 @@ def weigh(score, weight, M):  # pragma: no cover
         weight[m] /= total
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def start_again(x, P, score, restart, n, M):  # pragma: no cover
+    """Give the filters slower than the best one, and by exp(-restart) less likely, its state and covariance; `score` ends at 0."""
+    best = 0
+    for m in range(1, M):
+        if score[m] > score[best]:
+            best = m
+    for m in range(best):
+        if score[m] < -restart:
+            for j in range(n):
+                x[j, m] = x[j, best]
+                for k in range(n):
+                    P[j, k, m] = P[j, k, best]
+
+
 @functools.lru_cache
-def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
+def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters over a block.
 
-    They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M). `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the
+    They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots. `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the
     columns of F and H that are not zero, their number last. `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 4) as
-    in `admit`, `setting` = [started, forget, gate, patience, stuck_after], `levels` (M,) what the weights average into the row LEVEL.
+    in `admit`, `setting` = [started, forget, gate, patience, stuck_after, restart], `levels` (M,) what the weights average into the row LEVEL.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
-        P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, n, M))
+        P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))
-        e, spread, weight = np.empty(M), np.empty(M), np.empty(M)
+        e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
         used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
         forget, gate, patience, stuck_after = setting[1], setting[2], setting[3], setting[4]
         weigh(score, weight, M)
         for k in range(Z.shape[1]):
             if setting[0] > 0.0:
-                predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M)
+                if form == SQUARE_ROOT:
+                    predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, lost, n, M)
+                else:
+                    predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form)
             informed = False
             for i in range(n_sensor):
                 row = BANK_HEADER_ROWS + BANK_ROWS * i
@@ -610,7 +791,10 @@ def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
                 out[row + INNOVATION_VARIANCE, k] = np.nan
                 used[i] = False
                 if np.isfinite(Z[i, k]):
-                    innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    if form == SQUARE_ROOT:
+                        innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    else:
+                        innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
                     mean, smallest = 0.0, np.inf
                     for m in range(M):
                         mean += weight[m] * e[m]
@@ -629,17 +813,27 @@ def bank_kernel(n: int, n_sensor: int, M: int) -> Any:
                     score[m] *= forget
                 for i in range(n_sensor):
                     if used[i]:
-                        innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        if form == SQUARE_ROOT:
+                            innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        else:
+                            innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
                         for m in range(M):
                             score[m] += log_likelihood(e[m], spread[m] + R[i], gate)
-                        update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                        if form == SQUARE_ROOT:
+                            update_root_bank(x, P, R[i], e, spread, g, total, n, M)
+                        elif form == JOSEPH:
+                            update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                        else:
+                            update_plain_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
                 weigh(score, weight, M)
+                start_again(x, P, score, setting[5], n, M)
             rate, variance, level = 0.0, 0.0, 0.0
             for m in range(M):
                 rate += weight[m] * x[0, m]
                 level += weight[m] * levels[m]
             for m in range(M):
-                variance += weight[m] * (P[0, 0, m] + (x[0, m] - rate) ** 2)
+                own = row_square(P[:, :, m], 0, n) if form == SQUARE_ROOT else P[0, 0, m]
+                variance += weight[m] * (own + (x[0, m] - rate) ** 2)
             out[RATE, k] = rate
             out[STD, k] = np.sqrt(variance)
             out[LEVEL, k] = level
@@ -833,7 +1027,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
                 # Sent out first: in hardware the covariance has until the next reading.
                 out[RATE, k] = x[0]
-                update_root(P, G, gain, R, array, n, n_sensor)
+                update_root(P, G, gain, R, due, n, n_sensor)
             hits = 0
             for i in range(n_sensor):
                 if due[i]:

@@ -202,13 +202,15 @@ def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, Float
 
 
 def covariance_root(P: FloatArray) -> FloatArray:
-    """Return D with D D' = P for a positive semidefinite P [state^2], shape (n_state, n_state) [state].
+    """Return D with D D' = P for a positive semidefinite P [state^2], lower triangular, shape (n_state, n_state) [state].
 
     By the eigenvalues of the correlations, so that a state of small variance keeps its digits beside one of large variance.
     """
     std = np.sqrt(np.diag(P))
     scale = np.where(std > 0.0, std, 1.0)
     values, vectors = np.linalg.eigh(P / np.outer(scale, scale))
-    # Symmetric but for the scale, so that a diagonal P has a diagonal root.
-    root: FloatArray = scale[:, None] * (vectors * np.sqrt(np.clip(values, 0.0, None)) @ vectors.T)
+    # Symmetric before the QR, so that a diagonal P has a diagonal root.
+    symmetric = vectors * np.sqrt(np.clip(values, 0.0, None)) @ vectors.T
+    triangle = np.asarray(np.linalg.qr(symmetric, mode="r")).T
+    root: FloatArray = scale[:, None] * triangle * np.where(np.diag(triangle) < 0.0, -1.0, 1.0)
     return root

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FilterParameters
+from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FormParameters
 from testbed.fusion.kernels import (
     BANK_HEADER_ROWS,
     BANK_ROWS,
@@ -21,7 +21,7 @@ from testbed.fusion.kernels import (
     bank_kernel,
 )
 from testbed.fusion.model import build_model
-from testbed.units import PositiveDuration
+from testbed.units import PositiveDuration  # noqa: TC001  (pydantic reads it)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 
-class WidebandParameters(FilterParameters):
+class WidebandParameters(FormParameters):
     """Parameters of `Wideband`; q, here the lowest of the bank, is 1e4 (deg/s)^2/s^5 for order 3.
 
     Parameters
@@ -44,6 +44,8 @@ class WidebandParameters(FilterParameters):
         Number of filters, their q evenly spaced in logarithm.
     memory : float
         Time constant with which old readings lose their say on the weights [s]; 50 ms is a factor of 0.999 per sample at 20 kHz.
+    restart : float
+        A filter slower than the most likely one, and by the factor exp(-restart) less likely, starts again from that one's state.
     gate : float
         A reading is refused if even the filter least surprised by it finds it that many standard deviations off.
     patience : int
@@ -58,6 +60,7 @@ class WidebandParameters(FilterParameters):
     decades: Annotated[float, Field(gt=0.0, le=30.0)] = 15.0
     filters: Annotated[int, Field(ge=2, le=32)] = 16
     memory: PositiveDuration = 0.05
+    restart: Annotated[float, Field(gt=0.0)] = 20.0
     gate: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
     patience: Annotated[int, Field(ge=0)] = 10
     stuck_after: Annotated[int, Field(ge=0)] = 10
@@ -69,8 +72,9 @@ class Wideband(BlockFilter):
     .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
         \hat x = \sum w_i \hat x_i, \quad P = \sum w_i (P_i + (\hat x_i - \hat x)^2)
 
-    with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run side by side and never
-    exchange state: they differ in how fast a signal they expect. A square beyond gate^2 counts by its logarithm. No band, no threshold on
+    with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run side by side and
+    differ in how fast a signal they expect. One that is too slow for the signal spoils its slow states, which take half a minute to
+    recover: it is given state and covariance of the best filter until it does better. A square beyond gate^2 counts by its logarithm. No band, no threshold on
     the signal. Refused readings (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the
     weighted mean of log10 q [rad^2/s^(2m+1)].
 
@@ -97,16 +101,30 @@ class Wideband(BlockFilter):
         super().__init__(belief, sample_rate_hz, parameters)
         q = parameters.q * np.logspace(0.0, parameters.decades, parameters.filters)
         self._R = self.measurement_noise("R", {}, explicit=False)
-        self._Q = _noise_of_bank(belief, sample_rate_hz, parameters, q)
+        self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
         self._levels = np.log10(q)
         self._x = np.zeros((self._x.size, q.size))
         self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
         self._score = np.zeros(q.size)
         self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
         forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
-        self._setting = np.array([0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after])
+        self._setting = np.array(
+            [0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart]
+        )
         self._columns = _columns(self.model.F), _columns(self.model.H)
-        self._run = bank_kernel(len(self._x), self._R.size, q.size)
+        self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form)
+
+    def _noise_of_bank(
+        self,
+        belief: Mapping[str, SensorBelief],
+        sample_rate_hz: Mapping[str, float],
+        parameters: WidebandParameters,
+        q: FloatArray,
+    ) -> FloatArray:
+        """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
+        order, use = parameters.order, parameters.use_input_noise
+        models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
+        return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
     def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
         """Filter the next block.
@@ -138,18 +156,6 @@ class Wideband(BlockFilter):
             diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
             diagnostics[f"refused_{name}"] = out[row + REFUSED]
         return EstimateBlock(out[RATE], out[STD], diagnostics)
-
-
-def _noise_of_bank(
-    belief: Mapping[str, SensorBelief],
-    sample_rate_hz: Mapping[str, float],
-    parameters: WidebandParameters,
-    q: FloatArray,
-) -> FloatArray:
-    """Return Q of each filter, shape (n_state, n_state, n_filter)."""
-    order, use = parameters.order, parameters.use_input_noise
-    models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
-    return np.ascontiguousarray(np.stack([model.Q for model in models], axis=2))
 
 
 def _columns(matrix: FloatArray) -> np.ndarray:

@@ -49,22 +49,24 @@ def readings(reference: Any) -> dict[str, FloatArray]:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize(("name", "parameters"), EVERY)
+@pytest.mark.parametrize(("name", "parameters"), [*EVERY, ("wideband", {})])
 def test_all_forms_are_the_same_filter(name: str, parameters: dict[str, Any], readings: dict[str, FloatArray]) -> None:
     blocks = {
         form: estimate(name, readings, sample_rate_hz=RATES, form=form, **parameters)
         for form in ("joseph", "conventional", "square_root")
     }
     wanted = blocks["joseph"]
+    assert len({block.rate.tobytes() for block in blocks.values()}) == 3
     for form, block in blocks.items():
         # P shrinks by 1e8 on the first readings, and the adaptation of Q and R feeds back: as in the tests of each filter.
         np.testing.assert_allclose(block.rate, wanted.rate, rtol=0, atol=1e-6 * DEG, err_msg=form)
         np.testing.assert_allclose(block.std, wanted.std, rtol=1e-5, err_msg=form)
         for key, value in wanted.diagnostics.items():
-            scale = np.nanmax(np.abs(value), initial=0.0)
-            np.testing.assert_allclose(
-                block.diagnostics[key], value, rtol=1e-4, atol=1e-6 * scale, err_msg=f"{form} {key}"
-            )
+            atol = 1e-6 * np.nanmax(np.abs(value), initial=0.0)
+            if key == "guard_hits":
+                # The second reading changes the variance of the gyro's slow state by 1.6e-16 of itself: rounding decides whether it counts.
+                atol = max(atol, 1.0)
+            np.testing.assert_allclose(block.diagnostics[key], value, rtol=1e-4, atol=atol, err_msg=f"{form} {key}")
 
 
 @pytest.mark.parametrize("form", ["joseph", "conventional", "square_root"])
@@ -101,11 +103,13 @@ def test_single_precision_is_single_throughout(form: int) -> None:
 @pytest.mark.oracle
 def test_triangularise_keeps_the_product_and_makes_a_triangle() -> None:
     rng = random_stream(5, "array")
-    for n, m in ((1, 2), (3, 3), (5, 7), (7, 14)):
+    for n, width in ((1, 2), (3, 1), (3, 4), (5, 3), (7, 8)):
+        m = n + width - 1
         A = rng.standard_normal((n, m)) * 10.0 ** rng.uniform(-6, 0, (n, 1))
         A[0, 1:] = 0.0
+        A[np.arange(m) >= np.arange(n)[:, None] + width] = 0.0
         L = A.copy()
-        triangularise(L, n, m)
+        triangularise(L, n, width)
         assert np.array_equal(np.triu(L, 1), np.zeros((n, m)))
         rows = np.linalg.norm(A, axis=1)
         # Householder is backward stable row by row: m eps of each pair of rows.
@@ -120,6 +124,7 @@ def test_root_steps_equal_the_matrix_equations(due: tuple[bool, bool]) -> None:
     rng = random_stream(6, "root")
     n = 4
     F, D, S, H = (rng.standard_normal((k, n)) for k in (n, n, n, 2))
+    S = np.tril(S)
     R, z = np.array([0.5, 2.0]), rng.standard_normal(2)
     x0 = rng.standard_normal(n)
     x, root, array = x0.copy(), D.copy(), np.empty((n, 2 * n))
@@ -135,7 +140,7 @@ def test_root_steps_equal_the_matrix_equations(due: tuple[bool, bool]) -> None:
     gain = P @ h.T @ np.linalg.inv(h @ P @ h.T + np.diag(R))
     np.testing.assert_allclose(K, gain, rtol=0, atol=1e-12)
     np.testing.assert_allclose(x, before + gain @ e, rtol=0, atol=1e-12)
-    update_root(root, G, K, R, array, n, 2)
+    update_root(root, G, K, R, np.array(due), n, 2)
     A = np.eye(n) - gain @ h
     wanted = A @ P @ A.T + gain @ np.diag(R) @ gain.T
     np.testing.assert_allclose(root @ root.T, wanted, rtol=0, atol=1e-12 * np.abs(P).max())
@@ -145,6 +150,7 @@ def test_covariance_root() -> None:
     model = build_model(default_belief(), RATES, order=3, q=3e6)
     for P in (model.Q, model.P0, np.zeros((2, 2)), np.diag([1.0, 0.0, 1e-20])):
         D = covariance_root(P)
+        assert np.array_equal(D, np.tril(D))
         std = np.sqrt(np.diag(P))
         assert np.all(np.abs(D @ D.T - P) <= 50 * EPS * np.outer(std, std))
     # An adapting Q relies on it: a diagonal has a diagonal root.

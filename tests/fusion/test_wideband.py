@@ -66,7 +66,9 @@ def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tupl
 def test_bank_equals_its_equations(reference: Any, order: int) -> None:
     readings = reference.readings(reference.sines((40.0, 1.0), duration=0.01), 3)
     q = {1: 1e-2 * DEG**2, 3: 1e4 * DEG**2}[order]
-    p = WidebandParameters(order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3)
+    p = WidebandParameters(
+        order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3, restart=np.inf
+    )
     ours = run(readings, **p.model_dump())
     rate, std = literal_bank(readings, p)
     # eps times the 1e8 by which the first readings shrink P, as for the single filter.
@@ -172,6 +174,7 @@ def test_what_was_refused_is_counted(reference: Any) -> None:
         {"decades": 8.0},
         {"filters": 5},
         {"memory": 0.005},
+        {"restart": 0.1},
         {"gate": 3.0},
         {"patience": 0},
         {"stuck_after": 1},

@@ -1,0 +1,77 @@
+"""The judgement of `wideband` in short: few signals, few seeds, shorter runs; the full table is the example's."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PROGRAM = Path(__file__).parents[2] / "examples" / "wideband_against_fixed.py"
+SPEC = importlib.util.spec_from_file_location("wideband_against_fixed", PROGRAM)
+assert SPEC is not None
+assert SPEC.loader is not None
+example = importlib.util.module_from_spec(SPEC)
+# Data classes look their module up by name.
+sys.modules["wideband_against_fixed"] = example
+SPEC.loader.exec_module(example)
+
+
+def test_the_search_follows_the_grid_to_a_minimum() -> None:
+    """From either side, past its first three decades, and by the median over seeds."""
+    seen = []
+
+    def errors(decade: int) -> np.ndarray:
+        seen.append(decade)
+        return np.array([1.0, 1.0, 50.0]) + abs(decade - 7)
+
+    for start in (3, 7, 12):
+        best, values = example.best_fixed(errors, start)
+        assert best == 7
+        assert list(values) == [1.0, 1.0, 50.0]
+        assert {6, 8} <= set(seen)
+        seen.clear()
+
+
+@pytest.mark.parametrize("label", ["mixed", "100 Hz", "wheel run-up"])
+def test_close_to_the_best_fixed_filter(label: str) -> None:
+    """1.15 is promised for the median over ten seeds; two seeds of 4 s scatter more at low frequency, hence 1.3 there."""
+    found = example.judge(label, (31, 32), 4.0)
+    assert found.ratio <= (1.15 if label == "100 Hz" else 1.3)
+    assert found.wideband <= 0.0035
+
+
+def test_the_wheel_is_that_of_the_scenario() -> None:
+    motions, _ = example.signals()["wheel"]
+    assert motions[0].lines() == pytest.approx([40.0, 80.0, 120.0, 208.0], rel=1e-9)
+
+
+def test_changed_beliefs_are_off_by_what_is_said() -> None:
+    freq = np.array([0.3, 5.0, 200.0])
+    for belief in example.BELIEF.values():
+        right = belief.realisation()
+        gain = example.changed(belief, gain=0.95).realisation()
+        corner = example.changed(belief, corner=1.05).realisation()
+        np.testing.assert_allclose(gain.response(freq), 0.95 * right.response(freq), rtol=1e-9)
+        np.testing.assert_allclose(corner.response(freq), right.response(freq / 1.05), rtol=1e-9)
+
+
+@pytest.mark.parametrize("sensor", ["mhd_ars", "mems_gyro"])
+@pytest.mark.parametrize(("key", "factor"), [("gain", 1.05), ("gain", 0.95), ("corner", 1.05), ("corner", 0.95)])
+def test_a_wrong_belief_costs_what_it_forces(sensor: str, key: str, factor: float) -> None:
+    """At most 1.3 sqrt(ideal^2 + forced^2), 5 % of scale factor or corner, both signs, both sensors; 10 Hz, where both count."""
+    wrong = example.BELIEF | {sensor: example.changed(example.BELIEF[sensor], **{key: factor})}
+    error, ideal, forced = example.mismatch_ratios(10.0, example.MISMATCH_AT[10.0], wrong, (31, 32), 2.0).T
+    assert np.all(error <= 1.3 * np.hypot(ideal, forced))
+
+
+@pytest.mark.parametrize("label", list(example.CHANGES))
+def test_a_change_in_the_middle_costs_no_more_than_a_third(label: str) -> None:
+    """From 0.1 s after the change on, against the second signal from the start; slow states that a fast signal spoilt would cost 20 times."""
+    for seed in (31, 32):
+        real, ideal, peak = example.change_errors(label, seed, 4.0)
+        # Without belief error the bound of a wrong belief is 1.3 of the ideal; NaN would fail.
+        assert real <= 1.3 * ideal
+        assert np.isfinite(peak)
