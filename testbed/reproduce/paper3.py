@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from testbed.audit.page import Audited, write_audit
 from testbed.audit.quality import low_pass
 from testbed.audit.summary import summary
 from testbed.compensation import paper3
-from testbed.compensation.features import Features
 from testbed.compensation.fading import fading_memory, noise_ratio
-from testbed.compensation.model_only import DriftModel, train
+from testbed.compensation.features import Features
+from testbed.compensation.model_only import train
 from testbed.compensation.record import Record
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    from testbed.compensation.model_only import DriftModel
+    from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
 
     Compensate = Callable[[Record], FloatArray]
@@ -129,10 +131,10 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
     duration, steps = PROGRAMMES[programme]
     profile = TemperatureProfile.model_validate({"start": "20 degC", "steps": steps}, context={"border": True})
     n_time = round(duration * sample_rate_hz)
-    stage = (
-        load_preset("fog_paper3").model_copy(update={"sample_rate": sample_rate_hz}).start(sample_rate_hz, seed, "fog")
-    )
-    rate = stage.process_in(np.full(n_time, EARTH), Surroundings(temperature=profile.at(0, n_time, sample_rate_hz)))
+    fog = cast("Fog", load_preset("fog_paper3")).model_copy(update={"sample_rate": sample_rate_hz})
+    stage = fog.start(sample_rate_hz, seed, "fog")
+    oven = Surroundings(temperature=profile.at(0, n_time, sample_rate_hz))
+    rate = stage.process_in(np.full(n_time, EARTH), oven)
     return ThermalRecord(f"{programme}, seed {seed}", Record(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
