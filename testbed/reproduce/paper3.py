@@ -17,7 +17,7 @@ from testbed.audit.page import Audited, write_audit
 from testbed.audit.quality import low_pass
 from testbed.audit.summary import summary
 from testbed.compensation import paper3
-from testbed.compensation.fading import fading_memory, noise_ratio
+from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
 from testbed.compensation.record import Record
@@ -152,7 +152,9 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
     one = [cycle("up first", 1000 + seed, fs).record]
     two = [*one, cycle("down first", 2000 + seed, fs).record]
     yield Case("original", "-", lambda record: record.rate)
-    yield Case("Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, noise_ratio(record.rate))[0])
+    yield Case(
+        "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
+    )
     yield Case("low-pass, 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         ("paper's pipeline", protocol.options),
