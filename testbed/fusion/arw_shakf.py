@@ -12,7 +12,7 @@ from testbed.fusion import kernels
 from testbed.fusion.bands import Bands, load_bands
 from testbed.fusion.base import DEG
 from testbed.fusion.shakf import SageHusa, SageHusaParameters
-from testbed.units import PositiveDuration  # pydantic reads the annotation
+from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -21,7 +21,7 @@ from testbed.fusion.kernels import (
     bank_kernel,
 )
 from testbed.fusion.model import build_model
-from testbed.units import PositiveDuration  (pydantic reads it)
+from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
