@@ -156,7 +156,7 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
     yield Case(
         "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
     )
-    yield Case("low-pass, 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
+    yield Case("low-pass of 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),

@@ -40,9 +40,10 @@ def test_the_honest_model_reduces_the_drift_and_keeps_noise_and_rate(written):
 @pytest.mark.slow
 def test_what_filters_the_noise_gets_no_coefficient(written):
     _, _, rows = written
-    for name in ("Kalman filter (22)", "low-pass, 300 s"):
+    for name in ("Kalman filter (22)", "low-pass of 300 s"):
         assert rows[name, "-"]["angle_random_walk_deg_sqrt_h"] == ""
-        assert rows[name, "-"]["bandwidth_hz"] != ""
+    # Interpolated between lines at periods of 200 and 400 s.
+    assert float(rows["low-pass of 300 s", "-"]["bandwidth_hz"]) == pytest.approx(1.0 / 300.0, rel=0.15, abs=0.0)
 
 
 @pytest.mark.slow
