@@ -76,7 +76,7 @@ def check(scenario: ScenarioFile) -> None:
 
 @app.command("list")
 def list_parts() -> None:
-    """List motions, sensors, presets and filters."""
+    """List motions, sensors, presets, filters, beliefs, bands and papers."""
     from testbed.catalogue import catalogue
     from testbed.terminal import print_catalogue
 
@@ -139,9 +139,9 @@ def allan(
 
 @app.command()
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper1, paper2.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper1, paper2, paper3.")],
     seeds: Annotated[int, typer.Option(min=1, help="Seeds to take the median over.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="Folder for the tables; default runs/<paper>.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for tables and figures; default runs/<paper>.")] = None,
 ) -> None:
     """Repeat the measurements of a paper and print its numbers beside ours."""
     from testbed.reproduce import run_paper
