@@ -138,7 +138,10 @@ def analyse(record: Record, min_tau: float | None = None, max_tau: float | None 
     if fitted.tau.size < len(TERMS):
         msg = f"expected at least {len(TERMS)} averaging times, got {fitted.tau.size} of those from {curve.tau[0]:g} s to {curve.tau[-1]:g} s"
         raise ScenarioError([Problem(msg, key="--min-tau, --max-tau", file=record.content)])
-    return Analysis(record, curve, fitted, fit_allan(fitted))
+    try:
+        return Analysis(record, curve, fitted, fit_allan(fitted))
+    except ValueError as error:
+        raise ScenarioError([Problem(str(error), file=record.content)]) from error
 
 
 def allan_figure(analyses: Sequence[Analysis]) -> Figure:

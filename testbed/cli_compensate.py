@@ -87,7 +87,8 @@ def apply(
     from testbed.compensate import apply_model
 
     columns = _columns(column, unit, temperature, temperature_unit, rate, time, time_unit, sensor)
-    typer.echo(apply_model(model, source, columns, out))
+    for line in apply_model(model, source, columns, out):
+        typer.echo(line)
 
 
 @app.command()

@@ -97,7 +97,9 @@ class ColumnFile:
             return self._names.index(column)
         if not (column.isdigit() and 1 <= int(column) <= self._n_columns):
             known = (
-                f"the header has {', '.join(map(repr, self._names))}" if self._names else f"there are {self._n_columns}"
+                f"the header has {', '.join(map(repr, self._names))}"
+                if self._names
+                else f"there are {self._n_columns} and no header: give a number from 1 on"
             )
             self._refuse(f"no column {column!r}; {known}", key=key)
         return int(column) - 1
@@ -141,11 +143,11 @@ class ColumnFile:
         steps = np.diff(t)
         usual = float(np.median(steps))
         if not usual > 0.0:
-            self._refuse("expected times that increase", key="--time")
+            self._refuse(f"expected times that increase, got a usual step of {usual:g} s; sort the rows", key="--time")
         uneven = np.flatnonzero(np.abs(steps - usual) > _JITTER * usual)
         if uneven.size:
             i = int(uneven[0])
-            message = f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is {usual:g} s"
+            message = f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is {usual:g} s; fill the gap or cut the record"
             rows = (line for line, _ in self._lines() if line > self._skip)
             line = next(line for row, line in enumerate(rows) if row == i + 1)
             self._refuse(message, line)
@@ -159,7 +161,8 @@ class ColumnFile:
             for index in columns:
                 value = fields[index] if index < len(fields) else ""
                 if not _is_number(value) or not math.isfinite(float(value)):
-                    self._refuse(f"expected a finite number in {self.label(index)}, got {value!r}", line)
+                    remedy = "write a decimal point" if "," in value else "fill it or cut the record"
+                    self._refuse(f"expected a finite number in {self.label(index)}, got {value!r}; {remedy}", line)
 
     def _split(self, text: str) -> list[str]:
         if self._delimiter is None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,22 +13,24 @@ from rich.table import Table
 
 from testbed.audit.leak import audit
 from testbed.audit.page import Audited, write_audit
-from testbed.audit.summary import DEG_H, LETTERS, summary
+from testbed.audit.summary import LETTERS, summary
 from testbed.compensation import paper3
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.report.numbers import significant
 from testbed.store import failing_as_run_error, write_text
-from testbed.thermal_records import Columns, ThermalRecord, read
+from testbed.thermal_records import Columns, ThermalRecord, check_options, read
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
     from testbed.compensation.record import Record
     from testbed.signals import FloatArray
 
 PAPER = "paper3"
+# A rate taken for a temperature moves by less, and so does an oven that was not switched on.
+LEAST_SPAN = 1.0  # K
 
 
 def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Path) -> Iterator[str]:
@@ -55,20 +59,40 @@ def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Pat
     """
     if method not in METHODS:
         raise ScenarioError([Problem(str(UnknownNameError("method", method, METHODS)), key="--method")])
-    cycles = []
+    check_options(sources, columns)
+    _check_file(out)
+    cycles: list[ThermalRecord] = []
     for source in sources:
-        cycles.append(read(source, columns))
-        yield f"cycle: {cycles[-1].name}, {cycles[-1].record.duration / 3600.0:.2f} h at {cycles[-1].record.sample_rate_hz:g} Hz"
+        cycle = read(source, columns)
+        _check_cycle(source, cycle, cycles)
+        cycles.append(cycle)
+        yield f"cycle: {cycle}"
+    yield f"training {method} ..."
     try:
         model = train([cycle.record for cycle in cycles], method=method)
     except ValueError as error:
         raise ScenarioError([Problem(str(error), file=", ".join(map(str, sources)))]) from error
-    document = {**model.to_dict(), "trained_on": [cycle.name for cycle in cycles]}
+    document = {**model.to_dict(), "trained_on": {cycle.fingerprint: cycle.name for cycle in cycles}}
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, json.dumps(document, allow_nan=False) + "\n")
     yield f"method {method}; error of the cross-validation {model.blocked_error / DEG_H:.4g} deg/h, noise of the means included"
     yield f"written: {out}"
+
+
+def _check_cycle(source: Path, cycle: ThermalRecord, before: Sequence[ThermalRecord]) -> None:
+    """Refuse a cycle without heat, and one that was there before."""
+    span = float(np.ptp(cycle.record.temperature))
+    if span < LEAST_SPAN:
+        msg = f"expected a temperature that moves by at least {LEAST_SPAN:g} K, got {span:.3g} K; name its column"
+        raise ScenarioError([Problem(msg, key="--temperature", file=str(source))])
+    if cycle.fingerprint in {other.fingerprint for other in before}:
+        raise ScenarioError([Problem("expected different cycles, got this one twice", file=str(source))])
+
+
+def _check_file(out: Path) -> None:
+    if out.is_dir():
+        raise ScenarioError([Problem("expected a file to write, got a folder", key="--out", file=str(out))])
 
 
 def read_model(path: Path) -> DriftModel:
@@ -84,19 +108,23 @@ def read_model(path: Path) -> DriftModel:
     ScenarioError
         If it is none.
     """
+    return _read_document(path)[0]
+
+
+def _read_document(path: Path) -> tuple[DriftModel, dict[str, str]]:
+    """Return a model, and the names of the cycles that it was trained on by their fingerprints."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(document, dict):
-            msg = f"drift model: expected a JSON object, got {type(document).__name__}"
-            raise ScenarioError([Problem(msg, file=str(path))])
-        return DriftModel.from_dict(document)
+        model = DriftModel.from_dict(document if isinstance(document, dict) else {})
+        return model, dict(document.get("trained_on", {}))
     except (OSError, ValueError) as error:
-        msg = f"expected a model that `testbed compensate train` wrote: {error}"
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"expected a model that `testbed compensate train` wrote: {reason}"
         raise ScenarioError([Problem(msg, file=str(path))]) from error
 
 
-def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> str:
-    """Compensate a record, write it as a text file, and return the line to print.
+def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterator[str]:
+    """Compensate a record, write it as a text file, and yield the lines to print.
 
     Parameters
     ----------
@@ -109,20 +137,29 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> str:
     out : Path
         Text file to write: time [s], compensated rate and drift [deg/h], and whether the temperature was outside the trained range.
 
+    Yields
+    ------
+    str
+        One line.
+
     Raises
     ------
     ScenarioError
         If model or record cannot be read.
     """
-    thermal = read(source, columns)
-    block = read_model(path).apply(thermal.record)
+    check_options([source], columns)
+    _check_file(out)
+    model, thermal = read_model(path), read(source, columns)
+    yield f"record: {thermal}"
+    block = model.apply(thermal.record)
     t = np.arange(block.rate.size) / thermal.record.sample_rate_hz
     rows = zip(t, block.rate / DEG_H, block.drift / DEG_H, block.extrapolated, strict=True)
     lines = [f"{time:.9g},{rate:.9g},{drift:.9g},{outside:d}" for time, rate, drift, outside in rows]
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
-    return f"{thermal.name}: {block.extrapolated.mean():.2%} of the samples outside the trained range; written: {out}"
+    yield f"{block.extrapolated.mean():.2%} of the samples outside the trained range"
+    yield f"written: {out}"
 
 
 def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> Audited:
@@ -146,9 +183,16 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     ScenarioError
         If model or record cannot be read, or the record is too short.
     """
+    check_options([source], columns)
+    if out.exists() and not out.is_dir():
+        raise ScenarioError([Problem("expected a folder to write, got a file", key="--out", file=str(out))])
+    trained = None if model == PAPER else _read_document(Path(model))
     thermal = read(source, columns)
+    tell(f"compensating {thermal}")
     try:
-        audited = _audit_paper(thermal, tell) if model == PAPER else _audit_file(model, thermal, tell)
+        audited = (
+            _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
+        )
     except ValueError as error:
         raise ScenarioError([Problem(str(error), file=str(source))]) from error
     with failing_as_run_error(str(out)):
@@ -165,14 +209,14 @@ def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited
     return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
 
 
-def _audit_file(path: str, thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
-    from pathlib import Path
-
-    model = read_model(Path(path))
+def _audit_trained(
+    path: Path, model: DriftModel, trained_on: dict[str, str], thermal: ThermalRecord, tell: Callable[[str], None]
+) -> Audited:
     block = model.apply(thermal.record)
     found = audit(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
-    name = f"{model.method}, trained on other cycles ({Path(path).name})"
-    return Audited(name, thermal, block.rate, found, float(block.extrapolated.mean()))
+    found = replace(found, seen=thermal.fingerprint in trained_on)
+    name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
+    return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))
 
 
 def print_audit(audited: Audited, folder: Path) -> None:
@@ -200,10 +244,13 @@ def print_audit(audited: Audited, folder: Path) -> None:
         "bandwidth left [Hz]": "bandwidth_hz",
         "least gain of a slow true rate": "least_gain_in_drift_band",
         "gain of a step": "step_gain",
+        "gain of Earth-rate steps": "earth_rate_gain",
     }
     for label, key in shown.items():
         if figures[key] is not None:
             console.print(f"{label}: {significant(figures[key], 4)}")
+    if audited.extrapolated is not None:
+        console.print(f"outside the trained range: {audited.extrapolated:.2%} of the samples")
     for leak in figures["leaks"]:
         console.print(f"LEAK: {leak}", style="red")
     console.print("verdict: " + ("no leak found" if figures["passed"] else "a leak; do not believe this result"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,11 +12,24 @@ from testbed import units
 from testbed.columns import ColumnFile, frequency, refusal, unit_factor
 from testbed.compensation.record import Record
 from testbed.errors import Problem, ScenarioError, UnknownNameError
+from testbed.units import CELSIUS, DEG_H
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from testbed.signals import FloatArray
+
+# Of a text file, by the field of `Columns`.
+OPTIONS = {
+    "rate": "--column",
+    "rate_unit": "--unit",
+    "temperature": "--temperature",
+    "temperature_unit": "--temperature-unit",
+    "sample_rate": "--rate",
+    "time": "--time",
+    "time_unit": "--time-unit",
+}
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,20 @@ class ThermalRecord:
     record: Record
     drift: FloatArray | None
 
+    @property
+    def fingerprint(self) -> str:
+        """Digest of the samples, by which a record is known again."""
+        return hashlib.sha256(self.record.rate.tobytes() + self.record.temperature.tobytes()).hexdigest()
+
+    def __str__(self) -> str:
+        """Say how long it is and what it spans: swapped columns and wrong units show."""
+        record = self.record
+        rate, heat = record.rate / DEG_H, record.temperature - CELSIUS
+        return (
+            f"{self.name}, {record.duration / 3600.0:.2f} h at {record.sample_rate_hz:g} Hz, "
+            f"rate {rate.min():.4g} to {rate.max():.4g} deg/h, temperature {heat.min():.1f} to {heat.max():.1f} degC"
+        )
+
 
 def read(source: Path, columns: Columns) -> ThermalRecord:
     """Return the record of a run folder or of a text file.
@@ -92,6 +120,29 @@ def read(source: Path, columns: Columns) -> ThermalRecord:
     if not source.is_file():
         raise refusal(source, "expected a text file or a run folder, got neither")
     return read_file(source, columns)
+
+
+def check_options(sources: Sequence[Path], columns: Columns) -> None:
+    """Refuse an option that none of the sources needs: it would be ignored.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        Run folders and text files.
+    columns : Columns
+        How to read them.
+
+    Raises
+    ------
+    ScenarioError
+        If all are run folders and a column is named, or none is and a sensor is.
+    """
+    if columns.sensor is not None and not any(source.is_dir() for source in sources):
+        raise refusal(sources[0], "expected a run folder with it", "--sensor")
+    if all(source.is_dir() for source in sources):
+        for name, option in OPTIONS.items():
+            if getattr(columns, name) != getattr(Columns, name):
+                raise refusal(sources[0], "expected a text file with it; a run folder knows its signals", option)
 
 
 def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
@@ -151,11 +202,12 @@ def read_file(path: Path, columns: Columns) -> ThermalRecord:
     ScenarioError
         If something is missing, not understood, no number or uneven in time; with the line.
     """
-    rate_factor = unit_factor(columns.rate_unit, "rad/s", "deg/h", "--rate-unit")
+    rate_factor = unit_factor(columns.rate_unit, "rad/s", "deg/h", "--unit")
     zero, kelvin = _temperature_scale(columns.temperature_unit)
     second = unit_factor(columns.time_unit, "s", "h", "--time-unit")
     if (columns.sample_rate is None) == (columns.time is None):
-        raise refusal(path, "expected either the sample rate (--rate) or the column of the time (--time)")
+        got = "neither" if columns.time is None else "both"
+        raise refusal(path, f"expected either the sample rate (--rate) or the column of the time (--time), got {got}")
     table = ColumnFile(path)
     wanted = [table.index(columns.rate, "--column"), table.index(columns.temperature, "--temperature")]
     clock = [] if columns.time is None else [table.index(columns.time, "--time")]

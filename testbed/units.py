@@ -20,6 +20,9 @@ from pydantic_core import PydanticCustomError, core_schema
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
+DEG_H = math.radians(1.0) / 3600.0  # rad/s
+CELSIUS = 273.15  # K, 0 degC
+
 _DEFINITIONS = """
 nano- = 1e-9 = n-
 micro- = 1e-6 = u- = µ- = μ-

@@ -166,6 +166,33 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         (["train", "{table}", "--time", "hours", "--temperature-unit", "m"], "--temperature-unit"),
         (["train", "{table}", "--rate", "1", "--column", "speed"], "no column 'speed'"),
         (["train", "{unseen}", "--sensor", "gyro"], "gyro"),
+        (["train", "{table}", "--rate", "1", "--time", "hours"], "(--time), got both"),
+        (["train", "{table}", "--rate", "1", "--unit", "deg"], "--unit: expected a quantity in rad/s"),
+        (["train", "{table}", "--rate", "1", "--sensor", "fog"], "--sensor: expected a run folder with it"),
+        (["train", "{unseen}", "--rate", "1"], "--rate: expected a text file with it"),
+        (["audit", "{model}", "{unseen}", "--unit", "deg/s"], "--unit: expected a text file with it"),
+        (["apply", "{model}", "{unseen}", "--column", "2"], "--column: expected a text file with it"),
+        (["train", "{unseen}", "{up}", "{unseen}"], "unseen: expected different cycles, got this one twice"),
+        # Of a cycle on the table at rest, the rate spans 0.6 deg/h, which is no thermal cycle in degC.
+        (
+            ["train", "{table}", "--rate", "0.1", "--column", "temperature", "--temperature", "rate"],
+            "--temperature: expected a temperature that moves by at least 1 K",
+        ),
+        (["apply", "{model}", "{gap}", "--time", "hours", "--time-unit", "h"], "gap.csv:32: uneven or missing sample"),
+        (["apply", "{model}", "{gap}", "--time", "hours", "--time-unit", "h"], "fill the gap or cut the record"),
+        (
+            ["apply", "{model}", "{nan}", "--rate", "0.1"],
+            "nan.csv:32: expected a finite number in 'rate', got 'nan'; fill it",
+        ),
+        (
+            ["apply", "{model}", "{comma}", "--rate", "0.1"],
+            "comma.csv:2: expected a finite number in 'rate', got '10,5'; write a",
+        ),
+        (
+            ["audit", "{missing}", "{unseen}"],
+            "missing: expected a model that `testbed compensate train` wrote: No such file",
+        ),
+        (["audit", "{model}", "{slow}", "--rate", "0.005"], "expected at least one reading in 100 s"),
         (["apply", "{table}", "{unseen}"], "expected a model that `testbed compensate train` wrote"),
         (["apply", "{missing}", "{unseen}"], "expected a model that `testbed compensate train` wrote"),
         (["audit", "{other}", "{unseen}"], "expected format 'testbed drift model'"),
@@ -176,14 +203,23 @@ def test_bad_input_ends_with_2_and_leaves_nothing(
     cycles, model, table, tmp_path, monkeypatch, capsys, arguments, message
 ):
     (tmp_path / "other.json").write_text('{"format": "something else"}')
-    (tmp_path / "short.csv").write_text("\n".join(table.read_text().splitlines()[:100]))
-    places = {
+    lines = table.read_text().splitlines()
+    texts = {
+        "short": lines[:100],
+        "gap": lines[:31] + lines[35:],
+        "nan": [*lines[:31], "0.1,nan,20", *lines[32:]],
+        "comma": ["hours;rate;temperature", "0;10,5;20,0", "0,1;10,5;20,0"],
+        "slow": [lines[0], *lines[1::20]],
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.csv").write_text("\n".join(text))
+    places = {name: tmp_path / f"{name}.csv" for name in texts} | {
         "unseen": cycles / "unseen",
+        "up": cycles / "up",
         "missing": tmp_path / "missing",
         "table": table,
         "model": model,
         "other": tmp_path / "other.json",
-        "short": tmp_path / "short.csv",
     }
     out = tmp_path / "out"
     filled = [argument.format(**places) for argument in arguments]
@@ -199,3 +235,72 @@ def test_a_run_without_a_thermometer_is_refused(tmp_path):
     testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
     with pytest.raises(ScenarioError, match="expected one sensor with a thermometer, got none"):
         read(tmp_path / "run", Columns())
+
+
+@pytest.mark.parametrize(("command", "what"), [("train", "a file"), ("apply", "a file"), ("audit", "a folder")])
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+    cycles, model, tmp_path, monkeypatch, capsys, command, what
+):
+    """A folder where a file is asked for, and the other way round; the words of the work do not appear."""
+    taken = tmp_path / "taken"
+    taken.write_text("mine") if command == "audit" else taken.mkdir()
+    sources = [cycles / "up"] if command == "train" else [model, cycles / "unseen"]
+    status, text = ends_with([command, *sources, "--out", taken], monkeypatch, capsys)
+    assert status == 2
+    assert f"--out: expected {what} to write" in text
+    assert "fog, 23.67 h" not in text
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_every_command_says_what_it_read(cycles, model, table, tmp_path, monkeypatch, capsys):
+    """Swapped columns: 20 degC to 60 and -30 become a rate, and a rate of 10.6 deg/h a temperature. No rule can know; the reader can."""
+    arguments = ["apply", model, table, "--rate", "0.1", "--column", "temperature", "--temperature", "rate"]
+    status, text = ends_with([*arguments, "--out", tmp_path / "swapped.csv"], monkeypatch, capsys)
+    assert status == 0
+    run = testbed.open_run(cycles / "unseen").sensors["fog"]
+    rate, heat = run.rate / DEG_H, run.temperature - 273.15
+    assert (
+        f"rate {heat.min():.4g} to {heat.max():.4g} deg/h, temperature {rate.min():.1f} to {rate.max():.1f} degC"
+        in text
+    )
+
+
+def test_a_model_audited_on_its_training_record_is_a_leak(cycles, tmp_path, monkeypatch, capsys):
+    """A frozen model lets every known rate pass, also on the record it has learned: only the record's identity tells."""
+    ends_with(["train", cycles / "up", "--out", tmp_path / "one.json"], monkeypatch, capsys)
+    status, text = ends_with(
+        ["audit", tmp_path / "one.json", cycles / "up", "--out", tmp_path / "a"], monkeypatch, capsys
+    )
+    assert status == 1
+    assert "LEAK: the model was trained on this very record" in text
+    found = json.loads((tmp_path / "a" / "audit.json").read_text())
+    assert found["trained_on_this_record"]
+    assert found["trained_on"] == ["up, fog"]
+    assert found["least_gain_in_drift_band"] == pytest.approx(1.0, abs=1e-9)
+    status, _ = ends_with(
+        ["audit", tmp_path / "one.json", cycles / "unseen", "--out", tmp_path / "b"], monkeypatch, capsys
+    )
+    assert not json.loads((tmp_path / "b" / "audit.json").read_text())["trained_on_this_record"]
+
+
+def test_a_run_without_noise_has_nothing_to_audit(model, tmp_path, monkeypatch, capsys):
+    text = (
+        (FOG / "thermal_cycle.yaml").read_text().replace("bandwidth: 0.5 Hz", "bandwidth: 0.05 Hz").split("expect:")[0]
+    )
+    (tmp_path / "silent.yaml").write_text(text.replace("sample_rate: 1 Hz", "sample_rate: 0.1 Hz, noise: off"))
+    testbed.run(testbed.load_scenario(tmp_path / "silent.yaml"), out=tmp_path / "silent")
+    status, text = ends_with(["audit", model, tmp_path / "silent", "--out", tmp_path / "out"], monkeypatch, capsys)
+    assert status == 2
+    assert "expected noise, got a ramp alone" in text
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupted_audit_leaves_nothing(cycles, model, tmp_path, monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("testbed.audit.page.gain_figure", interrupt)
+    status, text = ends_with(["audit", model, cycles / "unseen", "--out", tmp_path / "out"], monkeypatch, capsys)
+    assert status == 130
+    assert "nothing was left behind" in text
+    assert list(tmp_path.iterdir()) == []

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from testbed.audit.leak import DRIFT_PERIOD, LEAST_GAIN
-from testbed.audit.quality import BLOCK
-from testbed.audit.summary import DEG_H
+from testbed.audit.quality import block_means
 from testbed.palette import FILTERS, SENSORS, TRUTH
 from testbed.report.svg import INK, STYLE
 from testbed.sensors.allan_fit import term_variance
+from testbed.units import CELSIUS, DEG_H
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 SIZE_IN = (9.2, 4.6)
-_CELSIUS = 273.15
 # Colour and line of each curve of an Allan figure, by what it is.
 CURVES = {
     "record": (SENSORS[0], "-"),
@@ -54,11 +53,11 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
     Figure
         Rates [deg/h], each less its mean, and temperature [degC] against time [h].
     """
-    n_block = max(1, round(BLOCK * record.sample_rate_hz))
-    hours = _means(np.arange(record.rate.size) / record.sample_rate_hz / 3600.0, n_block)
+    fs = record.sample_rate_hz
+    hours = block_means(np.arange(record.rate.size) / fs / 3600.0, fs)
 
     def shown(rate: FloatArray) -> FloatArray:
-        means = _means(rate, n_block) / DEG_H
+        means = block_means(rate, fs) / DEG_H
         centred: FloatArray = means - means.mean()
         return centred
 
@@ -70,7 +69,7 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
         if drift is not None:
             top.plot(hours, shown(drift), color=TRUTH, linewidth=1.3, linestyle=(0, (3, 1.5)), label="true drift")
         middle.plot(hours, shown(compensated), color=FILTERS[0], linewidth=0.9, label="compensated")
-        bottom.plot(hours, _means(record.temperature, n_block) - _CELSIUS, color=SENSORS[3], linewidth=1.3)
+        bottom.plot(hours, block_means(record.temperature, fs) - CELSIUS, color=SENSORS[3], linewidth=1.3)
         top.set_ylabel("rate [deg/h]")
         middle.set_ylabel("rate [deg/h]")
         bottom.set(ylabel="T [°C]", xlabel="time [h]", xlim=(0.0, float(hours[-1])))
@@ -79,11 +78,6 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
         for axes in (top, middle, bottom):
             axes.grid(visible=True)
     return figure
-
-
-def _means(values: FloatArray, n_block: int) -> FloatArray:
-    means: FloatArray = values[: values.size // n_block * n_block].reshape(-1, n_block).mean(axis=1)
-    return means
 
 
 def allan_figure(qualities: Mapping[str, Quality], styles: Mapping[str, tuple[object, object]] = CURVES) -> Figure:

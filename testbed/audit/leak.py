@@ -18,9 +18,10 @@ from testbed.audit.injection import (
     survivor,
     usable_periods,
 )
-from testbed.audit.quality import assess, block_std, described_to, low_pass
+from testbed.audit.quality import BLOCK, assess, block_std, described_to, low_pass
 from testbed.sensors.allan import allan_deviation
 from testbed.signals import sample_times
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,8 +37,7 @@ LEAST_GAIN = 0.9
 LEAST_ORACLE_RATIO = 0.7
 # Sines small against the noise of a reading (0.047 deg/h at 1 Hz), so that a method that adapts to the noise does not take them for it; the step
 # about the size of the drift.
-SINE = np.radians(0.01) / 3600.0  # rad/s
-STEP = np.radians(0.05) / 3600.0  # rad/s
+SINE, STEP = 0.01 * DEG_H, 0.05 * DEG_H  # rad/s
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,8 @@ class Audit:
         Where short periods begin to be lost [Hz]; None if they are not.
     drift_reduction : float or None
         Std of the 100 s means of the true drift over those of what is left of it [-]; None where the drift is not known.
+    seen : bool, optional
+        Whether this very record was trained on before: a frozen model passes every known rate, whatever it learned of the record's own.
     """
 
     before: Quality
@@ -71,6 +73,7 @@ class Audit:
     earth_gain: float | None
     bandwidth_hz: float | None
     drift_reduction: float | None
+    seen: bool = False
 
     @property
     def oracle_ratio(self) -> float | None:
@@ -80,9 +83,17 @@ class Audit:
         return self.after.hour_deviation / self.oracle.hour_deviation
 
     @property
+    def block_std_ratio(self) -> float | None:
+        """Std of the 100 s means over that of the oracle [-]; None where that is not known or zero."""
+        if self.oracle is None or not self.oracle.block_std > 0.0:
+            return None
+        return self.after.block_std / self.oracle.block_std
+
+    @property
     def leaks(self) -> tuple[str, ...]:
         """Why the result cannot be believed; empty if nothing speaks against it."""
-        return tuple(self._lost_rates()) + tuple(self._better_than_possible())
+        seen = ("the model was trained on this very record: audit it on another cycle",) if self.seen else ()
+        return (*seen, *self._lost_rates(), *self._better_than_possible())
 
     def _lost_rates(self) -> Iterator[str]:
         slow = {
@@ -136,9 +147,12 @@ def audit(
     Raises
     ------
     ValueError
-        If the record is too short to hold two periods of a rate in the drift band.
+        If the record is too short to hold two periods of a rate in the drift band, has less than a reading in 100 s, or no noise.
     """
     fs = record.sample_rate_hz
+    if fs * BLOCK < 1.0:
+        msg = f"sample_rate_hz: expected at least one reading in {BLOCK:g} s, got {fs:g} Hz"
+        raise ValueError(msg)
     periods = usable_periods(record.rate.size, fs)
     if not periods or periods[-1] < DRIFT_PERIOD:
         least = 2.0 * next(period for period in PERIODS if period >= DRIFT_PERIOD)

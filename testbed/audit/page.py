@@ -10,10 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from testbed.audit.figures import allan_figure, drift_figure, gain_figure
-from testbed.audit.summary import DEG_H, summary
+from testbed.audit.summary import summary
 from testbed.report.numbers import fixed, plain, significant
 from testbed.report.svg import svg_text
 from testbed.store import write_text
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,6 +41,8 @@ class Audited:
         The findings.
     extrapolated : float, optional
         Share of samples outside the trained range [-].
+    trained_on : tuple of str, optional
+        Names of the cycles that it was trained on before.
     """
 
     method: str
@@ -47,6 +50,7 @@ class Audited:
     compensated: FloatArray
     audit: Audit
     extrapolated: float | None = None
+    trained_on: tuple[str, ...] = ()
 
 
 def write_audit(audited: Audited, folder: Path) -> Path:
@@ -64,13 +68,23 @@ def write_audit(audited: Audited, folder: Path) -> Path:
     Path
         The page.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     figures = summary(audited.audit)
-    about = {"method": audited.method, "record": audited.thermal.name, "extrapolated": audited.extrapolated}
-    write_text(folder / "audit.json", json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n")
-    write_text(folder / "gains.csv", _gains(audited.audit))
-    write_text(folder / "allan.csv", _allan(curves(audited.audit)))
-    write_text(folder / "audit.html", _page(audited, figures))
+    about = {
+        "method": audited.method,
+        "trained_on": list(audited.trained_on),
+        "record": audited.thermal.name,
+        "extrapolated": audited.extrapolated,
+    }
+    # All made before the first is written: an interrupt does not leave half a folder.
+    texts = {
+        "audit.json": json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n",
+        "gains.csv": _gains(audited.audit),
+        "allan.csv": _allan(curves(audited.audit)),
+        "audit.html": _page(audited, figures),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        write_text(folder / name, text)
     return folder / "audit.html"
 
 
@@ -121,6 +135,7 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
         sample_rate_hz=record.sample_rate_hz,
         audit=figures,
         extrapolated=audited.extrapolated,
+        trained_on=audited.trained_on,
         # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
         figures={name: Markup(svg_text(figure, name)) for name, figure in drawn.items()},
     )

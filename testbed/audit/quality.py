@@ -98,9 +98,24 @@ def block_std(rate: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> 
     block : float, optional
         Length of a block [s].
     """
-    length = round(block * sample_rate_hz)
-    means = rate[: rate.size // length * length].reshape(-1, length).mean(axis=1)
-    return float(means.std())
+    return float(block_means(rate, sample_rate_hz, block).std())
+
+
+def block_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> FloatArray:
+    """Return the means over blocks, shape (n_block,), an incomplete last block left out.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_time,)
+        Samples, any unit.
+    sample_rate_hz : float
+        [Hz].
+    block : float, optional
+        Length of a block [s].
+    """
+    length = max(1, round(block * sample_rate_hz))
+    means: FloatArray = values[: values.size // length * length].reshape(-1, length).mean(axis=1)
+    return means
 
 
 def low_pass(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:

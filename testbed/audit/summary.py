@@ -9,12 +9,12 @@ import numpy as np
 
 from testbed.allan_report import TERMS
 from testbed.audit.leak import DRIFT_PERIOD
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from testbed.audit.leak import Audit
     from testbed.audit.quality import Quality
 
-DEG_H = math.radians(1.0) / 3600.0
 # Letters of the coefficients that papers on fibre-optic gyros print.
 LETTERS = ("Q", "N", "B")
 
@@ -35,9 +35,10 @@ def summary(audit: Audit) -> dict[str, Any]:
     return {
         "passed": not audit.leaks,
         "leaks": list(audit.leaks),
+        "trained_on_this_record": audit.seen,
         "drift_reduction": _finite(audit.drift_reduction),
         "oracle_ratio_1h": _finite(audit.oracle_ratio),
-        "block_std_over_oracle": None if audit.oracle is None else audit.after.block_std / audit.oracle.block_std,
+        "block_std_over_oracle": audit.block_std_ratio,
         "bandwidth_hz": audit.bandwidth_hz,
         "least_gain_in_drift_band": min(line.gain for line in audit.gains if line.period >= DRIFT_PERIOD),
         "step_gain": audit.step_gain,

@@ -21,6 +21,7 @@ from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
 from testbed.compensation.record import Record
+from testbed.models.earth import SPEED
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
     Compensate = Callable[[Record], FloatArray]
 
-EARTH = 7.292115e-5 * np.sin(np.pi / 4.0)  # rad/s, about the vertical at 45 degrees
+EARTH = SPEED * np.sin(np.pi / 4.0)  # rad/s, about the vertical at 45 degrees
 _HOLD = {"hold": "2 h"}
 
 

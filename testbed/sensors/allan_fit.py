@@ -124,7 +124,7 @@ def fit_allan(curve: AllanCurve) -> AllanFit:
     Raises
     ------
     ValueError
-        If there are fewer than 5 averaging times or the record is constant.
+        If there are fewer than 5 averaging times, or the record is constant or a ramp without noise.
     """
     problem = _Problem(curve)
     squares = problem.solve()
@@ -216,6 +216,9 @@ class _Problem:
             solution, _ = nnls(weighted / scale, self._measured / spread)
             squares: FloatArray = solution / scale
             model = self._columns @ squares
+        if not squares[:-1].any():
+            msg = "curve: expected noise, got a ramp alone"
+            raise ValueError(msg)
         return squares
 
     def coefficient(self, k: int, squares: FloatArray) -> Coefficient:
