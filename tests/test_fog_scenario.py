@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 import testbed
 from testbed.allan_records import read_run
@@ -142,6 +143,50 @@ def test_it_rides_on_the_table_like_the_others(tmp_path):
     response = scenario.sensors["fog"].response(np.array([8.0]))[0]
     assert line["gain"] == pytest.approx(abs(response) * (1 + 5e-5), rel=1e-6)
     assert line["phase_deg"] == pytest.approx(np.angle(response, deg=True), abs=1e-3)
+
+
+def lag(tau, u):
+    """Filter with 1 / (tau s + 1) at 20 kHz, straight between samples."""
+    numerator, denominator, _ = cont2discrete(([1.0], [tau, 1.0]), 1.0 / 20_000.0, method="foh")
+    return lfilter(numerator.ravel(), denominator, u)
+
+
+@pytest.mark.oracle
+def test_it_rides_on_the_moving_table_of_mode_servo(tmp_path):
+    """400 Hz readings of a table that a motor turns, while its room warms, beside the sensors that it shares the table with.
+
+    Reference: scipy's low-pass over the truth of 20 kHz and means of 50 samples, written here. Two identical gyros, one silent: the
+    difference is the noise of the preset, of variance N^2/T + 2 Q^2/T^2 and a little 1/f noise.
+    """
+    text = CYCLE.parents[1].joinpath("static.yaml").read_text().split("fusion:")[0]
+    text = text.replace("duration: 20 s", "duration: 2 s\ntemperature: {start: 20 degC, stop: 50 degC, over: 2 s}")
+    text = text.replace("settle: 10 s", "settle: 0.5 s").replace("air_bearing}", "air_bearing, mode: servo}")
+    text = text.replace(
+        "sensors:\n", "sensors:\n  fog: {preset: fog_paper3}\n  silent: {preset: fog_paper3, noise: off}\n"
+    )
+    path = tmp_path / "servo.yaml"
+    path.write_text(text.replace("static: {}", "sine: {frequency: 8 Hz, rate: 1 deg/s}"))
+    scenario = testbed.load_scenario(path)
+    run = testbed.run(scenario)
+    assert {name: run.sensors[name].rate.size for name in ("fog", "silent")} == {"fog": 800, "silent": 800}
+    # The servo leaves an error that mode ideal does not have.
+    assert run.truth.rate.std() > 0.1 * np.radians(1.0)
+    command = np.radians(1.0) * np.sin(2.0 * np.pi * 8.0 * run.truth.time)
+    assert np.abs(run.truth.rate - command)[20_000:].max() > 1e-4 * np.radians(1.0)
+
+    fog, true_rate = scenario.sensors["fog"], run.truth["silent_rate"]
+    ambient = scenario.frame.temperature.at(0, true_rate.size, 20_000.0)
+    heat = lag(fog.thermal.coil_lag, ambient - 293.15)
+    felt = (1.0 + fog.scale_factor_temperature * heat) * true_rate + fog.thermal.bias(ambient, 20_000.0)
+    passed = lag(1.0 / (2.0 * np.pi * fog.bandwidth), felt)
+    expected = passed[1 : 1 + 799 * 50].reshape(-1, 50).mean(axis=1)
+    # From rest instead of settled at the first sample: gone after 50 time constants of 0.5 ms; then rounding of 1 deg/s.
+    np.testing.assert_allclose(run.sensors["silent"].rate[11:], expected[10:], rtol=0, atol=1e-9 * np.radians(1.0))
+
+    noise = run.sensors["fog"].rate - run.sensors["silent"].rate
+    white = fog.angle_random_walk**2 * 400.0 + 2.0 * fog.quantization**2 * 400.0**2
+    # Five standard deviations of a variance of 800 readings; 1/f noise adds less than one part in a hundred.
+    assert np.var(noise) == pytest.approx(white, rel=5.0 * np.sqrt(2.0 / 800.0) + 0.01, abs=0.0)
 
 
 def test_the_shipped_cycle_is_the_papers_programme():

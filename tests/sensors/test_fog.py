@@ -11,6 +11,7 @@ from testbed.sensors import load_preset
 from testbed.sensors.allan import allan_deviation, fit_allan
 from testbed.sensors.base import Surroundings, ThermalStage
 from testbed.sensors.fog import Fog, IntervalMean
+from testbed.sensors.noise_terms import NoiseStage
 
 HOUR = np.deg2rad(1.0) / 3600.0  # deg/h
 PRESET = load_preset("fog_paper3")
@@ -173,3 +174,37 @@ def test_a_step_of_temperature_in_degc_is_refused():
     values = {**PRESET.model_dump(), "thermometer": {"step": "0.0625 degC"}}
     with pytest.raises(ValueError, match="expected at most 100"):
         Fog.model_validate(values)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("seed", range(6))
+def test_a_weighted_fit_finds_the_papers_coefficients_in_a_day_of_noise(seed):
+    """85,200 readings at 1 Hz: N within 2.5 %, B within 6 %, and Q, which would cross N at 0.5 ms, only as an upper limit.
+
+    The density is known from 0.5 Hz to 1/day. The intervals of the fit, tested for coverage elsewhere, say what a seed may do: half of one is
+    1.96 standard deviations, so a bound is at least 2.6 of them: of six seeds and two coefficients one in nine trials would miss by chance.
+    """
+    fit = fitted_noise(1.0, 85_200, seed)
+    for found, true, bound in (
+        (fit.angle_random_walk, PRESET.angle_random_walk, 0.025),
+        (fit.bias_instability, PRESET.bias_instability, 0.06),
+    ):
+        assert found.value == pytest.approx(true, rel=bound, abs=0.0)
+        assert 0.5 * (found.upper - found.lower) < 0.75 * bound * true
+    assert not fit.quantization.identified
+    assert fit.quantization.upper > PRESET.quantization
+    assert fit.goodness.accepted
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("seed", range(3))
+def test_quantisation_is_identified_at_100_hz(seed):
+    """An hour: 3 Q^2/tau^2 is a twentieth of N^2/tau at 10 ms, and white noise is known there to sqrt(1/360,000)."""
+    fit = fitted_noise(100.0, 360_000, seed)
+    assert fit.quantization.identified
+    # Of Q^2, 5 % of a variance known to 0.3 % (a few neighbouring averaging times): 6 % of Q^2, 3 % of Q; four of them.
+    assert fit.quantization.value == pytest.approx(PRESET.quantization, rel=0.12, abs=0.0)
+
+
+def fitted_noise(fs, n_time, seed):
+    return fit_allan(allan_deviation(NoiseStage(PRESET.noise_terms(fs, seed, "fog")).process(n_time), fs))
