@@ -212,3 +212,26 @@ def test_lines_of_a_group_differ_in_more_than_color(digest: Digest):
     drawn = {line.get_label(): line for line in spectrum_figure(digest, colors_of(digest), None).axes[0].lines}
     assert drawn["kalman"]._dash_pattern != drawn["shakf"]._dash_pattern
     assert to_rgb(drawn["kalman"].get_color()) != to_rgb(drawn["shakf"].get_color())
+
+
+@pytest.mark.parametrize(
+    ("limits", "shown"),
+    [
+        ((1.3e-5, 8e-5), ["2×10⁻⁵", "5×10⁻⁵"]),  # no power of ten inside: the axis had no number at all
+        ((3e-5, 6e-4), ["5×10⁻⁵", "10⁻⁴", "0.0002", "0.0005"]),
+        ((1e-5, 1e-3), ["10⁻⁵", "10⁻⁴", "10⁻³"]),
+    ],
+)
+def test_a_narrow_logarithmic_axis_is_labelled_between_the_powers_of_ten(limits, shown):
+    from matplotlib.figure import Figure
+
+    from testbed.report.drawing import decade_axis
+
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set(yscale="log", ylim=limits)
+    decade_axis(axes)
+    figure.draw_without_rendering()
+    labels = axes.get_yticklabels() + axes.get_yticklabels(minor=True)
+    seen = {label.get_position()[1]: label.get_text() for label in labels if label.get_text()}
+    assert [seen[y] for y in sorted(seen) if limits[0] * 0.999 <= y <= limits[1] * 1.001] == shown

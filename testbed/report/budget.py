@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.report.drawing import WIDTH_IN, arrange, label
+from testbed.report.drawing import WIDTH_IN, arrange, decade_axis, label
 from testbed.report.figures import DASHES
-from testbed.report.numbers import decade, plain, significant
+from testbed.report.numbers import plain, significant
 from testbed.report.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -72,9 +72,8 @@ def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
         axes.set_ylabel("noise, input-referred, two-sided [deg/s/√Hz]")
         axes.xaxis.set_major_locator(LogLocator(numticks=20))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        decade_axis(axes)
         axes.grid(visible=True)
         arrange(figure, [*handles])
     return figure
