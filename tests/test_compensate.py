@@ -69,6 +69,21 @@ def test_a_run_is_read_with_its_true_drift(cycles):
     assert found.record.sample_rate_hz == pytest.approx(0.1, rel=1e-12)
 
 
+def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
+    """A truth of 20 kHz, readings at 400 Hz: the drift at the instant of each reading, by interpolation over time."""
+    scene = tmp_path / "table.yaml"
+    scene.write_text(
+        "name: table\nduration: 1 s\nturntable: {mode: ideal}\ntemperature: {start: 20 degC, stop: 80 degC, over: 1 s}\n"
+        "motion: [static: {}]\nsensors: {fog: {preset: fog_paper3}}\n"
+    )
+    run = testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
+    found = read(tmp_path / "run", Columns())
+    expected = np.interp(run.sensors["fog"].time, run.truth.time, run.truth.fog_drift)
+    assert found.record.sample_rate_hz == pytest.approx(400.0, rel=1e-9)
+    assert found.drift.size == found.record.rate.size == 400
+    np.testing.assert_allclose(found.drift, expected, rtol=1e-9, atol=1e-20)
+
+
 def test_a_text_file_gives_the_same_record_in_any_units(cycles, table):
     run = read(cycles / "unseen", Columns()).record
     by_time = read(table, Columns(time="hours", time_unit="h")).record

@@ -58,6 +58,10 @@ def test_earth_turns_show_the_vertical_component_once_up_and_once_down():
     rate = injection.earth_turns(T, latitude=np.pi / 6.0)
     np.testing.assert_allclose(np.unique(rate), 7.292115e-5 * np.array([-0.5, 0.0, 0.5]), rtol=1e-12)
     assert rate.mean() == pytest.approx(0.0, abs=1e-20)
+    # Up, east, down, west, twice: eight stations of equal length, up first.
+    stations = rate.reshape(8, -1)
+    assert np.ptp(stations, axis=1).max() == 0.0
+    np.testing.assert_array_equal(np.sign(stations[:, 0]), [1, 0, -1, 0, 1, 0, -1, 0])
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])

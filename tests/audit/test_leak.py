@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from testbed.audit.leak import audit
+from testbed.audit.injection import PERIODS
+from testbed.audit.leak import SINE, STEP, audit
 from testbed.audit.quality import low_pass
 from testbed.compensation.record import Record
 from testbed.sensors.noise import GyroNoise
@@ -80,6 +81,32 @@ def test_a_low_pass_is_no_leak_but_its_coefficients_are_withheld(cycle):
 def test_half_of_the_rate_is_a_leak_everywhere(cycle):
     record, _ = cycle
     assert len(examine(lambda of: 0.5 * of.rate, record).leaks) >= 5
+
+
+def test_the_limits_are_those_of_the_contract(cycle):
+    """Nine tenths of every slow rate, and seven tenths of the oracle's Allan deviation at 1 h."""
+    record, drift = cycle
+    assert not examine(lambda of: 0.901 * of.rate, record).leaks
+    low = examine(lambda of: 0.899 * of.rate, record)
+    # Five sines from 900 s on (1000, 2000, 3600, 7200, 21600 s), the step and the Earth.
+    assert len(low.leaks) == 7
+    found = examine(lambda of: of.rate - drift, record, drift)
+    for ratio, n_leak in ((0.699, 1), (0.701, 0)):
+        after = replace(found.after, hour_deviation=ratio * found.oracle.hour_deviation)
+        assert len(replace(found, after=after).leaks) == n_leak
+    assert replace(found, seen=True).leaks == ("the model was trained on this very record: audit it on another cycle",)
+
+
+def test_the_known_rates_are_small():
+    """A filter that adapts to the noise must not take the sines for it: together below the white noise of a reading at 1 Hz."""
+    assert np.sqrt(len(PERIODS) / 2.0) * SINE < NOISE.angle_random_walk
+    assert pytest.approx(0.05 * DEG_H, rel=1e-12, abs=0.0) == STEP
+
+
+def test_readings_rarer_than_a_block_are_refused(cycle):
+    record, _ = cycle
+    with pytest.raises(ValueError, match="expected at least one reading in 100 s"):
+        examine(lambda of: of.rate, replace(record, sample_rate_hz=0.0099))
 
 
 def test_a_record_too_short_for_the_drift_band_is_refused(cycle):

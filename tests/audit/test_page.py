@@ -141,6 +141,9 @@ def test_what_is_unknown_or_infinite_is_null(folders, results):
     # Seconds and four samples a period: the shortest sine at 0.25 Hz has 20 s.
     assert loaded(folders["smooth"])["gains"][0]["period_s"] == 20.0
     assert loaded(folders["smooth"])["after"]["coefficients"] is None
+    # The low-pass loses short periods, which is no loss in the drift band.
+    assert min(line["gain"] for line in loaded(folders["smooth"])["gains"]) < 0.1
+    assert loaded(folders["smooth"])["least_gain_in_drift_band"] > 0.95
 
 
 def test_the_verdict_stands_on_page_and_in_json(folders):

@@ -37,6 +37,28 @@ def test_the_honest_model_reduces_the_drift_and_keeps_noise_and_rate(written):
     assert float(original["drift_reduction"]) == pytest.approx(1.0, abs=1e-9)
 
 
+def test_the_honest_rows_never_see_the_record_that_they_are_judged_on(monkeypatch):
+    """Other programmes and other noise, one cycle or two; only the paper's rows train on the record itself."""
+    seen = []
+    monkeypatch.setattr(paper3, "train", lambda cycles, method: seen.append(cycles))
+    rows = list(paper3.cases(1, paper3.Protocol(0.01)))
+    judged = paper3.cycle("paper", 1, 0.01).record
+    assert [len(cycles) for cycles in seen] == [2, 2, 1, 2]
+    for record in (record for cycles in seen for record in cycles):
+        n_time = min(record.rate.size, judged.rate.size)
+        assert record.rate.size != judged.rate.size
+        assert not np.any(record.rate[:n_time] == judged.rate[:n_time])
+    assert [row.trained_on for row in rows].count("this record") == 2
+
+
+@pytest.mark.slow
+def test_the_original_has_the_coefficients_that_were_put_in(written):
+    """N and B of the preset; a day at 0.1 Hz tells them to some 5 and 10 %, and confused they would be off by twenty times."""
+    _, _, rows = written
+    assert float(rows["original", "-"]["angle_random_walk_deg_sqrt_h"]) == pytest.approx(7.8034e-4, rel=0.2, abs=0.0)
+    assert float(rows["original", "-"]["bias_instability_deg_h"]) == pytest.approx(1.5323e-2, rel=0.2, abs=0.0)
+
+
 @pytest.mark.slow
 def test_what_filters_the_noise_gets_no_coefficient(written):
     _, _, rows = written
