@@ -5,6 +5,7 @@ import pytest
 
 from testbed.audit.quality import assess, block_std, described_to, low_pass
 from testbed.sensors.allan import allan_deviation
+from testbed.sensors.allan_fit import judge_fit
 from testbed.sensors.noise import GyroNoise
 from testbed.signals import sample_times
 
@@ -41,6 +42,15 @@ def test_noise_is_described_to_the_end_and_drift_cuts_the_range():
     curve, bent = (allan_deviation(rate, FS) for rate in (white(3), white(3) + drift))
     assert described_to(curve) > 0.9 * curve.tau[-1]
     assert described_to(bent) < 0.3 * curve.tau[-1]
+
+
+def test_the_range_stops_three_averaging_times_before_the_longest_that_fits():
+    """Where the departure only begins to drown in the spread it still bends the coefficients."""
+    t = np.linspace(-1.0, 1.0, N_TIME)
+    curve = allan_deviation(white(3) + np.radians(0.5) / 3600.0 * np.sin(60.0 * t**3), FS)
+    fitting = [k for k in range(8, curve.tau.size) if judge_fit(curve.between(0.0, curve.tau[k])).p_value >= 0.05]
+    assert max(fitting) < curve.tau.size - 1
+    assert described_to(curve) == pytest.approx(curve.tau[max(fitting) - 3], rel=0.002)
 
 
 def test_low_pass_is_3_db_down_at_its_bandwidth_and_has_no_phase():
