@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from testbed.audit.figures import allan_figure, drift_figure, gain_figure
 from testbed.audit.summary import summary
+from testbed.audit.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.report.numbers import fixed, plain, significant
 from testbed.report.svg import svg_text
 from testbed.store import write_text
@@ -136,6 +137,7 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
         audit=figures,
         extrapolated=audited.extrapolated,
         trained_on=audited.trained_on,
+        paper={name: TABLE_2[name] for name in (ORIGINAL, PIPELINE)},
         # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
         figures={name: Markup(svg_text(figure, name)) for name, figure in drawn.items()},
     )

@@ -16,6 +16,7 @@ from testbed.audit.leak import audit
 from testbed.audit.page import Audited, write_audit
 from testbed.audit.quality import low_pass
 from testbed.audit.summary import summary
+from testbed.audit.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.compensation import paper3
 from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
@@ -53,16 +54,8 @@ PROGRAMMES = {
     "up first": (75_800, [_HOLD, _ramp("60", "0.12 K/min"), {"hold": "1 h"}, _ramp("-30", "0.12 K/min")]),
 }
 # "Temperature" alone, as the paper has it, cannot describe a drift that depends on its slope: here it gets the slope too.
-PIPELINE, WITH_SLOPE = "paper's pipeline", "the same with slope"
+WITH_SLOPE = "the same with slope"
 SLOPE = Features(degree=1, lags=())
-# Table 2: Q (its unit is not given), B [deg/h], N [deg/sqrt(h)], time [s]; the text has other figures for Q and B.
-PAPER: dict[str, tuple[float | None, ...]] = {
-    "original": (6.1269e-4, 1.5323e-2, 7.8034e-4, None),
-    "Kalman filter (22)": (None, 5.4223e-4, 1.2657e-4, 0.53),
-    "OLMD-KPCA": (1.4421e-3, 2.1259e-3, 4.268e-5, 1.98),
-    "CEEMDAN-LWT": (2.3125e-4, 5.6311e-4, 1.2956e-5, 3.28),
-    PIPELINE: (1.0132e-4, 1.1504e-4, 7.2110e-6, 3.62),
-}
 COLUMNS = (
     "quantization_urad",
     "bias_instability_deg_h",
@@ -153,7 +146,7 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
     fs = protocol.sample_rate_hz
     one = [cycle("up first", 1000 + seed, fs).record]
     two = [*one, cycle("down first", 2000 + seed, fs).record]
-    yield Case("original", "-", lambda record: record.rate)
+    yield Case(ORIGINAL, "-", lambda record: record.rate)
     yield Case(
         "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
     )
@@ -242,11 +235,11 @@ def _csv(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str
     lines = [",".join(("method", "trained_on", "leaks", *COLUMNS, *PAPER_COLUMNS))]
     for name, trained_on, *values in rows:
         leaks = sum(not run["passed"] for run in found[name, trained_on])
-        paper = PAPER.get(name, (None,) * 4)
+        paper = TABLE_2.get(name, (None,) * 4)
         lines.append(",".join([name, trained_on, str(leaks), *(_text(value) for value in (*values, *paper))]))
     ours = {name for name, *_ in rows}
     blank = ["" for _ in ("trained_on", "leaks", *COLUMNS)]
-    lines += [",".join([name, *blank, *map(_text, values)]) for name, values in PAPER.items() if name not in ours]
+    lines += [",".join([name, *blank, *map(_text, values)]) for name, values in TABLE_2.items() if name not in ours]
     return "\n".join(lines) + "\n"
 
 
@@ -258,7 +251,7 @@ def _printed(
     yield f"{'method':20s}{'trained on':18s}" + "".join(f"{head:>11s}" for head in heads)
     for name, trained_on, *values in rows:
         at = dict(zip(COLUMNS, values, strict=True))
-        paper = PAPER.get(name, (None,) * 4)
+        paper = TABLE_2.get(name, (None,) * 4)
         shown = [at["bias_instability_deg_h"], at["angle_random_walk_deg_sqrt_h"], paper[1], paper[2]]
         shown += [at[key] for key in ("drift_reduction", "oracle_ratio_1h", "least_gain_in_drift_band", "step_gain")]
         leaks = sum(not run["passed"] for run in found[name, trained_on])

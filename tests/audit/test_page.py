@@ -126,6 +126,9 @@ def test_the_numbers_of_the_page_are_those_of_the_json(folders, name):
     ):
         expected = [] if key == "bandwidth_hz" and found[key] is None else [found[key]]
         assert rows.get(label) == (None if found["oracle"] is None and "oracle" in label else expected)
+    # As the paper prints them: N, B.
+    assert rows["paper 3, Table 2: original"] == [7.8034e-4, 1.5323e-2]
+    assert rows["paper 3, Table 2: paper's pipeline"] == [7.2110e-6, 1.1504e-4]
     share = rows.get("samples flagged as outside the trained temperatures and slopes [%]")
     assert share == ([12.5] if name == "smooth" else None)
 
