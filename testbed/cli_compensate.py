@@ -108,7 +108,8 @@ def audit(
     sensor: Sensor = None,
 ) -> None:
     """Find out what a compensation removes and how much true rate survives; status 1 if it leaks."""
-    from testbed.compensate import audit_model, print_audit
+    from testbed.audit.terminal import print_audit
+    from testbed.compensate import audit_model
 
     columns = _columns(column, unit, temperature, temperature_unit, rate, time, time_unit, sensor)
     audited = audit_model(model, source, columns, out, lambda text: typer.echo(f"{text} ...", err=True))

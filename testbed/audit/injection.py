@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.models.earth import SPEED
 from testbed.signals import sample_times
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     Compensate = Callable[[Record], FloatArray]
 
 PERIODS = (10.0, 20.0, 40.0, 60.0, 100.0, 200.0, 400.0, 600.0, 1000.0, 2000.0, 3600.0, 7200.0, 21600.0)  # s
-EARTH_RATE = 7.292115e-5  # rad/s
 # Samples per period below which a sine says nothing about the compensation, and periods per record below which it cannot be told from a trend.
 _SAMPLES, _CYCLES = 4.0, 2.0
 # Of golden-angle phases: the sum of many sines stays low.
@@ -118,7 +118,7 @@ def earth_turns(t: FloatArray, latitude: float = np.pi / 4.0) -> FloatArray:
         Rate [rad/s].
     """
     turn = 8 * np.arange(t.size) // t.size
-    rate: FloatArray = EARTH_RATE * np.sin(latitude) * np.array([1.0, 0.0, -1.0, 0.0])[turn % 4]
+    rate: FloatArray = SPEED * np.sin(latitude) * np.array([1.0, 0.0, -1.0, 0.0])[turn % 4]
     return rate
 
 
