@@ -1,7 +1,8 @@
-"""What there is to choose from: motions, sensors, presets, filters; and the JSON schema of a scenario."""
+"""What there is to choose from: motions, sensors, presets, filters, beliefs, bands, papers; and the JSON schema of a scenario."""
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from importlib import resources
 from typing import Any
@@ -10,6 +11,7 @@ from testbed.fusion import FILTERS
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable import TurntableParameters
 from testbed.parts import preset_names, resolve
+from testbed.reproduce import PAPERS
 from testbed.scenario import Frame
 from testbed.sensors import SENSORS
 
@@ -23,19 +25,27 @@ def catalogue() -> dict[str, dict[str, str]]:
         }
         for kind, registry in (("motion", MOTIONS), ("sensor", SENSORS), ("filter", FILTERS))
     }
-    table["turntable preset"] = {name: _head("testbed.models", name) for name in preset_names("testbed.models")}
-    table["sensor preset"] = {name: _head("testbed.sensors", name) for name in preset_names("testbed.sensors")}
+    table["turntable preset"] = _heads("testbed.models", "presets")
+    table["sensor preset"] = _heads("testbed.sensors", "presets")
+    table["belief"] = _heads("testbed.fusion", "beliefs")
+    table["band set"] = _heads("testbed.fusion", "bands")
+    table["paper"] = {name: _first_line(importlib.import_module(module)) for name, module in PAPERS.items()}
     return table
 
 
-def _first_line(part: type[Any]) -> str:
+def _first_line(part: Any) -> str:
     return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
 
 
-def _head(package: str, name: str) -> str:
-    """Return the first comment line of a preset."""
-    text = (resources.files(package) / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
-    return text.splitlines()[0].lstrip("# ")
+def _heads(package: str, folder: str) -> dict[str, str]:
+    """Return the first comment line of each YAML file that a package ships in a folder."""
+    files = sorted((resources.files(package) / folder).iterdir(), key=lambda file: file.name)
+    texts = {
+        file.name.removesuffix(".yaml"): file.read_text(encoding="utf-8")
+        for file in files
+        if file.name.endswith(".yaml")
+    }
+    return {name: text.splitlines()[0].lstrip("# ") for name, text in texts.items()}
 
 
 def schema() -> dict[str, Any]:

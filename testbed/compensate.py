@@ -65,6 +65,7 @@ def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Pat
         raise ScenarioError([Problem(str(error), file=", ".join(map(str, sources)))]) from error
     document = {**model.to_dict(), "trained_on": [cycle.name for cycle in cycles]}
     with failing_as_run_error(str(out)):
+        out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, json.dumps(document, allow_nan=False) + "\n")
     yield f"method {method}; error of the cross-validation {model.blocked_error / DEG_H:.4g} deg/h, noise of the means included"
     yield f"written: {out}"
@@ -119,6 +120,7 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> str:
     rows = zip(t, block.rate / DEG_H, block.drift / DEG_H, block.extrapolated, strict=True)
     lines = [f"{time:.9g},{rate:.9g},{drift:.9g},{outside:d}" for time, rate, drift, outside in rows]
     with failing_as_run_error(str(out)):
+        out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
     return f"{thermal.name}: {block.extrapolated.mean():.2%} of the samples outside the trained range; written: {out}"
 

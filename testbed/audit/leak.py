@@ -18,7 +18,7 @@ from testbed.audit.injection import (
     survivor,
     usable_periods,
 )
-from testbed.audit.quality import assess, described_to, low_pass
+from testbed.audit.quality import assess, block_std, described_to, low_pass
 from testbed.sensors.allan import allan_deviation
 from testbed.signals import sample_times
 
@@ -56,7 +56,7 @@ class Audit:
     bandwidth_hz : float or None
         Where short periods begin to be lost [Hz]; None if they are not.
     drift_reduction : float or None
-        Rms of the true drift over rms of what is left of it, means removed [-]; None where the drift is not known.
+        Std of the 100 s means of the true drift over those of what is left of it [-]; None where the drift is not known.
     """
 
     before: Quality
@@ -153,7 +153,7 @@ def audit(
         step_gain=step_gain,
         earth_gain=earth_gain,
         bandwidth_hz=bandwidth,
-        drift_reduction=None if drift is None else _reduction(drift, plain - (record.rate - drift)),
+        drift_reduction=None if drift is None else _reduction(drift, plain - (record.rate - drift), fs),
     )
 
 
@@ -177,5 +177,6 @@ def _survival(
     return gains, share("a known step", step(t, SIZE)), share("Earth-rate steps", earth_turns(t))
 
 
-def _reduction(drift: FloatArray, rest: FloatArray) -> float:
-    return float(drift.std() / rest.std()) if rest.std() > 0.0 else np.inf
+def _reduction(drift: FloatArray, rest: FloatArray, sample_rate_hz: float) -> float:
+    left = block_std(rest, sample_rate_hz)
+    return block_std(drift, sample_rate_hz) / left if left > 0.0 else np.inf

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from testbed.fusion.base import BlockFilter, EstimateBlock, FilterParameters
-from testbed.fusion.kernels import RATE, STD
+from testbed.fusion.kernels import GATE, PATIENCE, RATE, STD
 from testbed.fusion.two_path_design import (
     HIGH_HZ,
     LOW_HZ,
@@ -59,6 +59,7 @@ class TwoPaths(BlockFilter):
     The bandwidth is the one with the least error for the sine named, noise and lag A |1 - L| / sqrt(2). The claimed variance is that
     error: the noise part from the covariance of sensors and filter together (periodic, exact), the lag at its mean. While the fast sensor is
     missing the rate stays and the variance grows as such a sine departs from its value; while the slow one is missing its drift is added.
+    A spike counts as missing, by the gate of the other filters.
 
     Parameters
     ----------
@@ -102,7 +103,8 @@ class TwoPaths(BlockFilter):
         forgotten = math.sqrt(drift) / fast.output_noise
         patience = 2 * self.model.strides[self._slow]
         setting = (paths.innovate, T, 2.0 * math.pi * parameters.frequency, power, forgotten, drift)
-        self._setting = np.array([*setting, math.exp(-2.0 * slowest * T), patience])
+        gate = (GATE**2, PATIENCE, self.model.R[self._fast], self.model.R[self._slow])
+        self._setting = np.array([*setting, math.exp(-2.0 * slowest * T), patience, *gate])
         self._x, self._memory = np.zeros(len(paths.A)), np.zeros(MEMORY_ROWS)
         self._matrices = (*paths.discrete(T), paths.C, paths.D, paths.H, paths.J, settled)
 

@@ -140,7 +140,7 @@ class TemperatureProfile(Part):
 
 
 def _given(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value not in (None, ())}
+    return {key: value for key, value in values.items() if value not in (None, (), [])}
 
 
 ROOM = TemperatureProfile(start=298.15, stop=298.15, over=1.0)

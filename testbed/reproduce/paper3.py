@@ -52,14 +52,15 @@ PROGRAMMES = {
     "up first": (75_800, [_HOLD, _ramp("60", "0.12 K/min"), {"hold": "1 h"}, _ramp("-30", "0.12 K/min")]),
 }
 # "Temperature" alone, as the paper has it, cannot describe a drift that depends on its slope: here it gets the slope too.
-WITH_SLOPE, SLOPE = "the same with slope", Features(degree=1, lags=())
+PIPELINE, WITH_SLOPE = "paper's pipeline", "the same with slope"
+SLOPE = Features(degree=1, lags=())
 # Table 2: Q (its unit is not given), B [deg/h], N [deg/sqrt(h)], time [s]; the text has other figures for Q and B.
 PAPER: dict[str, tuple[float | None, ...]] = {
     "original": (6.1269e-4, 1.5323e-2, 7.8034e-4, None),
     "Kalman filter (22)": (None, 5.4223e-4, 1.2657e-4, 0.53),
     "OLMD-KPCA": (1.4421e-3, 2.1259e-3, 4.268e-5, 1.98),
     "CEEMDAN-LWT": (2.3125e-4, 5.6311e-4, 1.2956e-5, 3.28),
-    "paper's pipeline": (1.0132e-4, 1.1504e-4, 7.2110e-6, 3.62),
+    PIPELINE: (1.0132e-4, 1.1504e-4, 7.2110e-6, 3.62),
 }
 COLUMNS = (
     "quantization_urad",
@@ -155,9 +156,9 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
     yield Case(
         "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
     )
-    yield Case("low-pass, 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
+    yield Case("low-pass of 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
     for name, options in (
-        ("paper's pipeline", protocol.options),
+        (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
     ):
         yield Case(name, "this record", _paper(options, seed))

@@ -131,7 +131,8 @@ def plain_twin(found: Any, fast: np.ndarray, slow: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("cls", FILTERS)
 def test_kernel_is_its_plain_twin(cls: Any) -> None:
     rng = np.random.default_rng(5)
-    z = {"mems_gyro": rng.standard_normal(200), "mhd_ars": rng.standard_normal(2000)}
+    # Within the gate against spikes, of which the plain recursion knows nothing.
+    z = {"mems_gyro": 0.1 * DEG * rng.standard_normal(200), "mhd_ars": 0.1 * DEG * rng.standard_normal(2000)}
     z["mems_gyro"][50:70] = np.nan
     found = cls(QUICK, RATES, TwoPathParameters())
     slow = np.full(2000, np.nan)
@@ -139,6 +140,15 @@ def test_kernel_is_its_plain_twin(cls: Any) -> None:
     wanted = plain_twin(found, z["mhd_ars"], slow)
     # Sums in another order, over 2000 steps.
     np.testing.assert_allclose(found.process(z).rate, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_lasting_change_passes_the_gate_after_ten_readings(cls: Any) -> None:
+    """A rate that jumps to 200 deg/s is outside the gate, but what lasts is the signal: the eleventh reading counts."""
+    fast = np.concatenate([np.zeros(2000), np.full(2000, 200.0 * DEG)])
+    found = cls(QUICK, RATES, TwoPathParameters()).process({"mhd_ars": fast, "mems_gyro": fast[::10]})
+    assert np.abs(found.rate[:2010]).max() < 1e-6
+    assert found.rate[-1] > 100.0 * DEG
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,69 @@
+"""Table 2 by both protocols, at a tenth of the sample rate and a fifth of the trials."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from testbed.compensation.paper3 import PaperOptions
+from testbed.reproduce import paper3
+
+SHORT = paper3.Protocol(0.1, PaperOptions(trials=10, grouping="period", wolves=10, iterations=5))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("paper3")
+    lines = list(paper3.report(1, out, SHORT))
+    with (out / "table_2.csv").open(newline="") as file:
+        return out, lines, {(row["method"], row["trained_on"]): row for row in csv.DictReader(file)}
+
+
+@pytest.mark.slow
+def test_the_papers_protocol_is_a_leak_and_the_honest_one_is_not(written):
+    _, _, rows = written
+    leaks = {key: int(row["leaks"]) for key, row in rows.items() if row["leaks"]}
+    assert leaks[paper3.PIPELINE, "this record"] == 1
+    assert leaks[paper3.WITH_SLOPE, "this record"] == 1
+    assert all(count == 0 for (_, trained_on), count in leaks.items() if trained_on != "this record")
+
+
+@pytest.mark.slow
+def test_the_honest_model_reduces_the_drift_and_keeps_noise_and_rate(written):
+    _, _, rows = written
+    ours, original = rows["gradient", "2 other cycle(s)"], rows["original", "-"]
+    assert float(ours["drift_reduction"]) > 5.0
+    assert float(ours["least_gain_in_drift_band"]) == pytest.approx(1.0, abs=1e-6)
+    assert float(original["drift_reduction"]) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_what_filters_the_noise_gets_no_coefficient(written):
+    _, _, rows = written
+    for name in ("Kalman filter (22)", "low-pass of 300 s"):
+        assert rows[name, "-"]["angle_random_walk_deg_sqrt_h"] == ""
+    # Interpolated between lines at periods of 200 and 400 s.
+    assert float(rows["low-pass of 300 s", "-"]["bandwidth_hz"]) == pytest.approx(1.0 / 300.0, rel=0.15, abs=0.0)
+
+
+@pytest.mark.slow
+def test_the_papers_numbers_stand_beside_ours(written):
+    """Table 2 as printed; two of its methods are not ours and have its numbers alone."""
+    out, lines, rows = written
+    assert rows[paper3.PIPELINE, "this record"]["paper_angle_random_walk_deg_sqrt_h"] == "7.211e-06"
+    assert rows["original", "-"]["paper_bias_instability_deg_h"] == "0.015323"
+    assert rows["OLMD-KPCA", ""]["seconds"] == ""
+    assert rows["OLMD-KPCA", ""]["paper_seconds"] == "1.98"
+    assert sum("leak" in line for line in lines) >= 9
+    assert len(list(out.glob("audit_*/audit.html"))) == 9
+
+
+def test_a_cycle_has_the_drift_of_the_paper_and_the_earth_on_top():
+    """Noise-free closed form: the mean of the reading is Earth rate plus mean drift, but for noise and scale factor by temperature."""
+    thermal = paper3.cycle("paper", 3, 0.1)
+    assert thermal.record.rate.size == 8520
+    assert thermal.drift.std() == pytest.approx(np.radians(0.096) / 3600.0, rel=0.02, abs=0.0)
+    # 10 ppm/K of 10.6 deg/h over 45 K is 0.005 deg/h, and 1/f noise of 0.015 deg/h stays in the mean.
+    assert thermal.record.rate.mean() - thermal.drift.mean() == pytest.approx(
+        paper3.EARTH, abs=np.radians(0.06) / 3600.0
+    )
