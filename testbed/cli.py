@@ -76,7 +76,7 @@ def check(scenario: ScenarioFile) -> None:
 
 @app.command("list")
 def list_parts() -> None:
-    """List motions, sensors, presets and filters."""
+    """List motions, sensors, presets, filters, beliefs, bands and papers."""
     from testbed.catalogue import catalogue
     from testbed.terminal import print_catalogue
 
@@ -143,7 +143,7 @@ def reproduce(
     seeds: Annotated[
         int | None, typer.Option(min=1, help="Seeds to take the median over; default 10 for paper1, 1 for the others.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the tables; default runs/<paper>.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for tables and figures; default runs/<paper>.")] = None,
 ) -> None:
     """Repeat the measurements of a paper and print its numbers beside ours."""
     from testbed.reproduce import run_paper

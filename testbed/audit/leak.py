@@ -34,7 +34,10 @@ if TYPE_CHECKING:
 DRIFT_PERIOD = 900.0  # s
 LEAST_GAIN = 0.9
 LEAST_ORACLE_RATIO = 0.7
-SIZE = np.radians(0.05) / 3600.0  # rad/s, 0.05 deg/h: of each sine and of the step, about the size of the drift
+# Sines small against the noise of a reading (0.047 deg/h at 1 Hz), so that a method that adapts to the noise does not take them for it; the step
+# about the size of the drift.
+SINE = np.radians(0.01) / 3600.0  # rad/s
+STEP = np.radians(0.05) / 3600.0  # rad/s
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,8 @@ def _survival(
     """Return what survives of sines, of a step and of Earth-rate steps."""
     t = sample_times(0, record.rate.size, record.sample_rate_hz)
     tell("compensating it with known sines added")
-    survived = survivor(compensate, record, plain, sines(t, periods, SIZE))
-    gains = line_gains(survived, record.sample_rate_hz, periods, SIZE)
+    survived = survivor(compensate, record, plain, sines(t, periods, SINE))
+    gains = line_gains(survived, record.sample_rate_hz, periods, SINE)
 
     def share(name: str, known: FloatArray) -> float | None:
         tell(f"compensating it with {name} added")
@@ -174,7 +177,7 @@ def _survival(
             tell(f"it fails: {error}")
             return None
 
-    return gains, share("a known step", step(t, SIZE)), share("Earth-rate steps", earth_turns(t))
+    return gains, share("a known step", step(t, STEP)), share("Earth-rate steps", earth_turns(t))
 
 
 def _reduction(drift: FloatArray, rest: FloatArray, sample_rate_hz: float) -> float:
