@@ -120,7 +120,7 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
     write_text(out / "table_ii.csv", f"signal,name,{','.join(COLUMNS)}\n{text}\n")
 
 
-def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tuple[float | None, float | None]]:
+def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tuple[float, float]]:
     """Return floor and optimum of each signal [deg/s], of its lines as they are in the truth after settle."""
     sensors, first, lines = presets(), round(protocol.settle * BASE_HZ), []
     for signal, rate in rates.items():
@@ -129,14 +129,12 @@ def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tu
         lines.append(judged.truth_lines())
     floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
     best = signal_optima(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()}, lines)
+    # Both sensors are rational and see every frequency between them.
+    assert floor is not None
+    assert best is not None
     return {
-        signal: (_degrees(floor), _degrees(one.rmse if one else None))
-        for signal, one in zip(rates, best or [None] * len(rates), strict=True)
+        signal: (float(np.rad2deg(floor)), float(np.rad2deg(one.rmse))) for signal, one in zip(rates, best, strict=True)
     }
-
-
-def _degrees(rate: float | None) -> float | None:
-    return None if rate is None else float(np.rad2deg(rate))
 
 
 def _statistics(runs: list[tuple[float, float]]) -> tuple[float, float, float, float]:
