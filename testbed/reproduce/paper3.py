@@ -171,7 +171,7 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
         ("gradient", "gradient", two),
     ):
         model = train(cycles, method=method)
-        yield Case(name, f"{len(cycles)} other cycle(s)", _applied(model))
+        yield Case(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
 
 
 def _paper(options: paper3.PaperOptions, seed: int) -> Compensate:

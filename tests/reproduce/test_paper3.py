@@ -42,7 +42,7 @@ def test_the_papers_protocol_is_a_leak_and_the_honest_one_is_not(written):
 @pytest.mark.slow
 def test_the_honest_model_reduces_the_drift_and_keeps_noise_and_rate(written):
     _, _, rows = written
-    ours, original = rows["gradient", "2 other cycle(s)"], rows["original", "-"]
+    ours, original = rows["gradient", "2 other cycles"], rows["original", "-"]
     assert float(ours["drift_reduction"]) > 5.0
     assert float(ours["least_gain_in_drift_band"]) == pytest.approx(1.0, abs=1e-6)
     assert float(original["drift_reduction"]) == pytest.approx(1.0, abs=1e-9)
