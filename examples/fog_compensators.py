@@ -9,12 +9,14 @@ Run it with ``OMP_NUM_THREADS=1 python examples/fog_compensators.py [SEEDS]`` (d
 
 from __future__ import annotations
 
+import itertools
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.audit.leak import audit
 from testbed.compensation.features import Features
 from testbed.compensation.lssvm import Lssvm, block_residuals
 from testbed.compensation.model_only import DriftModel, train
@@ -129,14 +131,14 @@ def cycles(seed: int, fog: Fog = FOG) -> tuple[dict[str, Cycle], list[Cycle]]:
 
 def head(what: str) -> None:
     """Print the head of a table."""
-    print(f"\n{what:>24}{'trained on':>26}{'reduction: median':>20}{'least':>8}{'to oracle: median':>20}{'worst':>8}")
+    print(f"\n{what:>33}{'trained on':>25}{'reduction: median':>20}{'least':>8}{'to oracle: median':>20}{'worst':>8}")
 
 
 def row(label: str, training: str, pairs: list[tuple[float, float]]) -> None:
     """Print a row of a table."""
     reduction, ratio = np.array(pairs).T
     print(
-        f"{label:>24}{training:>26}{np.median(reduction):>20.1f}{reduction.min():>8.1f}{np.median(ratio):>20.2f}{ratio.max():>8.2f}",
+        f"{label:>33}{training:>25}{np.median(reduction):>20.1f}{reduction.min():>8.1f}{np.median(ratio):>20.2f}{ratio.max():>8.2f}",
         flush=True,
     )
 
@@ -161,13 +163,27 @@ def other_truths(seeds: range) -> None:
     head("instrument, method")
     for truth in TRUTHS:
         data = [cycles(seed, other(truth)) for seed in seeds]
-        for method in ("gradient", "process"):
-            models = [(train([known[n].record for n in TRAINING["paper, 2"]], method=method), u) for known, u in data]
-            row(f"{truth}, {method}", "paper, 2", [judge(model, each) for model, unseen in models for each in unseen])
+        for method, training in itertools.product(("gradient", "process"), ("paper, 2", "two rates, 2")):
+            names, pairs = TRAINING[training], []
+            for known, unseen in data:
+                model = train([known[name].record for name in names], method=method)
+                pairs += [judge(model, each) for each in unseen]
+            row(f"{truth}, {method}", training, pairs)
         known, unseen = data[0]
         quiet = [Record(EARTH + known[n].drift, known[n].record.temperature, 1.0) for n in TRAINING["paper, 2"]]
         model = train(quiet, method="gradient")
         row(f"{truth}, gradient", "paper, 2, no noise", [judge(model, each) for each in unseen])
+
+
+def audited(model: DriftModel, seed: int) -> None:
+    """Print what the audit says of a model on an unseen cycle."""
+    unseen = cycle("slower, holds", 100 * seed + 60)
+
+    def compensate(record: Record) -> np.ndarray:
+        return model.apply(record).rate
+
+    found = audit(compensate, unseen.record, compensate(unseen.record), unseen.drift)
+    print(f"{model.method}, audit: {'; '.join(found.leaks) or 'no leak found'}")
 
 
 def noise_and_gain(model: DriftModel, seeds: range) -> None:
@@ -214,7 +230,9 @@ def main() -> None:
     compare(seeds)
     other_truths(seeds)
     for method in ("gradient", "process"):
-        noise_and_gain(train([cycle(name, 100 + k).record for k, name in enumerate(UNSEEN[:2])], method=method), seeds)
+        model = train([cycle(name, 100 + k).record for k, name in enumerate(UNSEEN[:2])], method=method)
+        noise_and_gain(model, seeds)
+        audited(model, seeds[0])
     searches(seeds[0])
 
 
