@@ -133,7 +133,9 @@ def likeliest_ridge(U: FloatArray, y: FloatArray, group: NDArray[np.intp]) -> Fl
         root = np.exp(0.5 * log_variance)[group[~flat]]
         L = np.linalg.cholesky(np.outer(root, root) * A + np.eye(root.size))
         half = np.linalg.solve(L, root * b)
-        return float(0.5 * dof * np.log(total - half @ half) + np.log(np.diag(L)).sum())
+        # A target that is zero throughout is likely under any variance.
+        left = max(total - half @ half, np.finfo(float).tiny)
+        return float(0.5 * dof * np.log(left) + np.log(np.diag(L)).sum())
 
     n_group = int(group.max()) + 1
     found = minimize(unlikelihood, np.zeros(n_group), method="L-BFGS-B", bounds=[(-_SPAN, _SPAN)] * n_group)

@@ -60,10 +60,11 @@ def test_whitening_makes_the_noise_of_a_gyro_white(rng):
     assert np.corrcoef(rows[1:], rows[:-1])[0, 1] > 0.5
 
 
-def test_features_that_determine_nothing_get_no_weight(rng):
-    """A chamber that never moved: only rounding is left of every feature, and the drift is zero."""
-    still = Record(1e-7 + 1e-9 * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
-    rows = gather([still], Features(), block=7200.0)
+@pytest.mark.parametrize("noise", [1e-9, 0.0])
+def test_features_that_determine_nothing_get_no_weight(rng, noise):
+    """A chamber that never moved: only rounding is left of every feature, and the drift is zero; also of a rate that never moved."""
+    still = Record(1e-7 + noise * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
+    rows = gather([still], Features(plays=(3.0,)), block=7200.0)
     for fit in (fit_polynomial, fit_coloured, fit_process):
         assert np.allclose(fit(rows)[0].weights, 0.0, rtol=0.0, atol=1e-15)
 
