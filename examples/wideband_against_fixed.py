@@ -7,6 +7,7 @@ The wheel is that of scenarios/satellite_microvibration.yaml: alone, through a r
 
 Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about 40 s of processor time
 for each signal with ten seeds of 20 s. ``--mismatch`` prints the table of wrong beliefs instead, ``--change`` the one of changing signals.
+``--filters`` and ``--restart`` give `wideband` other parameters than its own in the first and the last, to see what they are for.
 """
 
 from __future__ import annotations
@@ -120,26 +121,28 @@ class Judgement:
     ratio_of_medians: float
 
 
-def judge(label: str, seeds: Sequence[int], duration: float) -> Judgement:
-    """Judge one signal of `signals` over paired seeds."""
+def judge(label: str, seeds: Sequence[int], duration: float, **own: float) -> Judgement:
+    """Judge one signal of `signals` over paired seeds; `own` are parameters of `wideband`."""
     motions, decade = signals()[label]
     rate = truth(motions, duration)
     records = [readings(rate, seed) for seed in seeds]
-    ours = np.array([rmse("wideband", z, rate, BELIEF) for z in records])
+    ours = np.array([rmse("wideband", z, rate, BELIEF, **own) for z in records])
     at, theirs = best_fixed(lambda d: np.array([fixed(z, rate, d) for z in records]), decade)
     middle, other = float(np.median(ours)), float(np.median(theirs))
     ratio = float(np.median(ours / theirs))
     return Judgement(label, len(seeds), middle, float(ours.max()), other, at, ratio, middle / other)
 
 
-def against_fixed(labels: Sequence[str], seeds: Sequence[int], duration: float, target: Path | None) -> None:
+def against_fixed(
+    labels: Sequence[str], seeds: Sequence[int], duration: float, target: Path | None, own: dict[str, float]
+) -> None:
     """Print a line per signal, and write them to a file."""
     print(
         f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, {duration:g} s"
     )
     rows = []
     for label in labels:
-        row = judge(label, seeds, duration)
+        row = judge(label, seeds, duration, **own)
         rows.append(asdict(row))
         met = max(row.ratio, row.ratio_of_medians) <= RATIO and row.wideband <= TARGETS.get(label, np.inf)
         print(
@@ -216,26 +219,26 @@ CHANGES = {
 AFTER = 0.1  # s; two memories of the filter
 
 
-def change_errors(label: str, seed: int, duration: float = 10.0) -> tuple[float, float, float]:
+def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -> tuple[float, float, float]:
     """Return the errors [deg/s] from `AFTER` on, without a change (the second signal from the start, same noise), and the largest error."""
     before, after = (truth([sine(*line)], duration) for line in CHANGES[label])
     half, rest = before.size // 2, before.size // 2 + round(AFTER * RATES["mhd_ars"])
     rate = np.concatenate([before[:half], after[half:]])
     errors = [
-        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF).rate - one) / DEG
+        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, **own).rate - one) / DEG
         for one in (rate, after)
     ]
     real, ideal = (float(np.sqrt(np.mean(error[rest:] ** 2))) for error in errors)
     return real, ideal, float(np.max(np.abs(errors[0][half:])))
 
 
-def under_change(seeds: Sequence[int]) -> None:
+def under_change(seeds: Sequence[int], own: dict[str, float]) -> None:
     """Print what a change in the middle of the run costs: promised are at most 1.3 times the error without it."""
     print(
         f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after the change on"
     )
     for label in CHANGES:
-        real, ideal, peak = np.array([change_errors(label, seed) for seed in seeds]).T
+        real, ideal, peak = np.array([change_errors(label, seed, **own) for seed in seeds]).T
         worst = float(np.max(real / ideal))
         print(
             f"{label:>18}{np.median(ideal):9.5f}{np.median(real):9.5f}{worst:9.3f}{peak.max():14.3f}"
@@ -251,17 +254,20 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=20.0, help="of a run in s")
     parser.add_argument("--signals", nargs="+", default=list(signals()), choices=list(signals()), metavar="SIGNAL")
     parser.add_argument("--csv", type=Path, help="where to write the table")
+    parser.add_argument("--filters", type=int, help="in the bank of `wideband`, over the same decades")
+    parser.add_argument("--restart", type=float, help="of `wideband`; 1e12 is never")
     table = parser.add_mutually_exclusive_group()
     table.add_argument("--mismatch", action="store_true", help="print the table of wrong beliefs instead")
     table.add_argument("--change", action="store_true", help="print the table of signals that change instead")
     given = parser.parse_args()
     seeds = range(FIRST_SEED, FIRST_SEED + given.seeds)
+    own = {key: value for key in ("filters", "restart") if (value := getattr(given, key)) is not None}
     if given.mismatch:
         under_mismatch(seeds)
     elif given.change:
-        under_change(seeds)
+        under_change(seeds, own)
     else:
-        against_fixed(given.signals, seeds, given.duration, given.csv)
+        against_fixed(given.signals, seeds, given.duration, given.csv, own)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What there is to choose from: motions, sensors, presets, filters, beliefs, bands, papers; and the JSON schema of a scenario."""
+"""What there is to choose from: motions, sensors, presets, filters, beliefs, bands, drift models, papers; and the JSON schema of a scenario."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import inspect
 from importlib import resources
 from typing import Any
 
+from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable import TurntableParameters
@@ -29,6 +30,7 @@ def catalogue() -> dict[str, dict[str, str]]:
     table["sensor preset"] = _heads("testbed.sensors", "presets")
     table["belief"] = _heads("testbed.fusion", "beliefs")
     table["band set"] = _heads("testbed.fusion", "bands")
+    table["drift model"] = {name: _first_line(fit).split(";")[0] for name, (_, fit, _) in METHODS.items()}
     table["paper"] = {name: _first_line(importlib.import_module(module)) for name, module in PAPERS.items()}
     return table
 

@@ -140,7 +140,9 @@ def allan(
 @app.command()
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which paper: paper1, paper2, paper3.")],
-    seeds: Annotated[int, typer.Option(min=1, help="Seeds to take the median over.")] = 1,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="Seeds to take the median over; default 10 for paper1, 1 for the others.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for tables and figures; default runs/<paper>.")] = None,
 ) -> None:
     """Repeat the measurements of a paper and print its numbers beside ours."""

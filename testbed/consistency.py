@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri, ndtri
 
+from testbed.metrics import finite
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -53,7 +55,7 @@ class Whiteness:
 
     def nis(self) -> float | None:
         """Return the mean normalised innovation squared [-], 1 if the claims hold; None without readings."""
-        return _finite(self._products[0] / self.n) if self.n else None
+        return finite(self._products[0] / self.n) if self.n else None
 
     def nis_bounds(self) -> tuple[float, float]:
         """Return what it lies between by chance, if the innovations are white and Gaussian: quantiles of chi-square over n [-]."""
@@ -65,7 +67,7 @@ class Whiteness:
         if not self._products[0] > 0.0:
             return None
         rho = self._products[1:] / self._products[0]
-        return _finite(rho[np.argmax(np.abs(rho))])
+        return finite(rho[np.argmax(np.abs(rho))])
 
     def correlation_bound(self) -> float:
         """Return what it stays below by chance if they are white [-]: 1/sqrt(n) per lag, and the miss shared by the lags."""
@@ -113,7 +115,7 @@ class Consistency:
 
     def result(self) -> dict[str, Any]:
         """Return NEES, per sensor NIS and the largest correlation with their bounds, and the verdict; None where undefined."""
-        found: dict[str, Any] = {"nees": _finite(self._square / self._n) if self._n else None}
+        found: dict[str, Any] = {"nees": finite(self._square / self._n) if self._n else None}
         for sensor, sums in self._sensors.items():
             known = sums.n > 0
             found[f"nis_{sensor}"] = sums.nis()
@@ -139,8 +141,3 @@ class Consistency:
             if not low / FACTOR <= nis <= high * FACTOR:
                 return "innovations too large" if nis > 1.0 else "innovations too small"
         return "consistent"
-
-
-def _finite(value: Any) -> float | None:
-    """None where a number is undefined: metrics.json never holds NaN."""
-    return float(value) if np.isfinite(value) else None

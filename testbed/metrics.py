@@ -93,15 +93,15 @@ class ErrorMetrics:
         gains = self._gains()
         rest = self._rest() if self._lines else 0.0
         return {
-            "rmse_deg_s": _finite(np.rad2deg(np.sqrt(self._square / self._n))),
+            "rmse_deg_s": finite(np.rad2deg(np.sqrt(self._square / self._n))),
             "rmse_aligned_deg_s": self._aligned(gains, rest),
-            "peak_error_deg_s": _finite(np.rad2deg(self._peak)),
+            "peak_error_deg_s": finite(np.rad2deg(self._peak)),
             "lines": [
                 {
                     "frequency_hz": line,
-                    "gain": None if g is None else _finite(abs(g)),
-                    "phase_deg": None if g is None else _finite(np.angle(g, deg=True)),
-                    "error_deg_s": None if g is None else _finite(np.rad2deg(_hypot(rest, a * abs(g - 1.0)))),
+                    "gain": None if g is None else finite(abs(g)),
+                    "phase_deg": None if g is None else finite(np.angle(g, deg=True)),
+                    "error_deg_s": None if g is None else finite(np.rad2deg(_hypot(rest, a * abs(g - 1.0)))),
                 }
                 for line, (a, g) in zip(self._lines, gains, strict=True)
             ],
@@ -113,7 +113,7 @@ class ErrorMetrics:
         if not self._n:
             return {"mean_std_deg_s": None, "inside_2_std": None}
         return {
-            "mean_std_deg_s": _finite(np.rad2deg(np.sqrt(self._variance / self._n))),
+            "mean_std_deg_s": finite(np.rad2deg(np.sqrt(self._variance / self._n))),
             "inside_2_std": self._inside / self._n,
         }
 
@@ -142,7 +142,7 @@ class ErrorMetrics:
         if not gains or any(g is None for _, g in gains):
             return None
         lines = sum(a**2 * (abs(g) - 1.0) ** 2 / 2.0 for a, g in gains if g is not None)
-        return _finite(np.rad2deg(np.sqrt(rest + lines)))
+        return finite(np.rad2deg(np.sqrt(rest + lines)))
 
 
 def _hypot(rest: float, amplitude: float) -> float:
@@ -156,8 +156,14 @@ def _phasors(gram: FloatArray, projection: FloatArray) -> list[complex]:
     return [complex(p, -q) for p, q in fit.reshape(-1, 2)]
 
 
-def _finite(value: Any) -> float | None:
-    """None where a number is undefined: metrics.json never holds NaN."""
+def finite(value: Any) -> float | None:
+    """Return a number, or None where it is undefined: metrics.json never holds NaN.
+
+    Parameters
+    ----------
+    value : float
+        Any unit.
+    """
     return float(value) if np.isfinite(value) else None
 
 

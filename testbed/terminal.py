@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _PLAIN_EVERY = 5.0
 # A tenth of the Earth's rate [deg/s].
 _SLOW = 1.5 / 3600.0
-# Columns of the terminal: errors of a filter, and gain, phase and error over optimum of one line.
-_TABLE_WIDTH, _LINE_WIDTH = 70, 31
+# Columns of the terminal: errors of a filter beside its name, and gain, phase and error over optimum of one line.
+_TABLE_WIDTH, _LINE_WIDTH = 61, 31
 
 
 @contextmanager
@@ -96,7 +96,9 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         }
     )
     # With many lines, or on a narrow terminal, the table would not fit: the report has them all.
-    shown = lines if len(lines) <= 4 and console.width >= _TABLE_WIDTH + _LINE_WIDTH * len(lines) else []
+    longest = max(map(len, (*metrics["sensors"], *metrics["fusion"])), default=0)
+    width = _TABLE_WIDTH + longest + _LINE_WIDTH * len(lines)
+    shown = lines if len(lines) <= 4 and console.width >= width else []
     headings = (
         "",
         "RMSE",

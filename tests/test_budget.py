@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.budget import believed, budget_summary, crossovers, noise_budget, signal_optima, signal_optimum
+from testbed.budget import _excess, believed, budget_summary, crossovers, noise_budget, signal_optima, signal_optimum
 from testbed.metrics import floor_density, floor_rmse
 from testbed.sensors import load_preset
 
@@ -103,6 +103,15 @@ def test_an_instrument_is_believed_to_be_what_it_is():
     assert gyro.input_noise == pytest.approx(0.15 / 60.0 * DEG, rel=0.02, abs=0.0)
     assert mhd.output_noise == pytest.approx(1e-7, rel=0.02, abs=0.0)
     assert mhd.input_noise < 1e-9
+
+
+@pytest.mark.oracle
+def test_what_the_belief_leaves_out_of_a_sensor_is_its_coloured_noise():
+    """Of `sx300` 1/f with a knee of 0.1 Hz: (1e-7)^2 times 0.1 Hz / f on the reading, less the 2 % at most by which the white fit is off."""
+    mhd = SENSORS["mhd_ars"]
+    freq = np.array([0.001, 0.01, 0.1, 0.5])
+    np.testing.assert_allclose(_excess(mhd, believed(mhd))(freq) / 1e-14, 0.1 / freq, rtol=0, atol=0.025)
+    assert not _excess(mhd, believed(mhd))(np.array([10.0, 100.0])).any()
 
 
 def test_coloured_noise_raises_the_optimum():

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import testbed
 from testbed.budget import budget_summary
@@ -76,6 +77,23 @@ def test_the_terminal_says_it_in_one_line(
     quiet = run[0] | {"budget": None}
     print_metrics(quiet, tmp_path)
     assert "noise floor:" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("width", [80, 100, 116, 132, 160])
+def test_no_terminal_cuts_a_number(
+    run: tuple[dict[str, Any], Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    width: int,
+) -> None:
+    """Lines are left to the report where they do not fit, also behind a long name."""
+    row = run[0]["fusion"]["complementary"]
+    monkeypatch.setattr("testbed.terminal._console", lambda: Console(width=width))
+    print_metrics(run[0] | {"fusion": {"complementary": row, "a_long_filter_name": row}}, tmp_path)
+    text = capsys.readouterr().out
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
+    assert f"{row['rmse_deg_s'] / row['optimum_rmse_deg_s']:.1f} │" in text
 
 
 def test_the_report_has_the_section(run: tuple[dict[str, Any], Path]) -> None:

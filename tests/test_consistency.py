@@ -92,6 +92,8 @@ def test_any_division_into_blocks_gives_the_same_values(size: int) -> None:
         (1.0, 1.0, "consistent"),
         (1.5, 1.0, "optimistic"),
         (0.6, 1.0, "pessimistic"),
+        (1.0, 1.3, "consistent"),
+        (1.0, 0.8, "consistent"),
         (1.0, 1.7, "innovations too large"),
         (1.0, 0.5, "innovations too small"),
         (np.nan, 1.0, None),

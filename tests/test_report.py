@@ -230,11 +230,13 @@ def test_report_without_lines_floor_filters_or_spectrum(tmp_path: Path):
 
 
 def test_report_optimum_column_only_when_known(tmp_path: Path, page: str):
-    assert ("fusion", "kalman", "optimum_rmse_deg_s") not in Tables(page).cells
+    assert not {("fusion", "kalman", key) for key in ("optimum_rmse_deg_s", "optimum_ratio")} & set(Tables(page).cells)
     metrics = metrics_of(0.2, 0.0, ("kalman",))
     metrics["fusion"]["kalman"]["optimum_rmse_deg_s"] = 0.0013
     cells = Tables(write_report(make_run(tmp_path / "run", metrics)).read_text(encoding="utf-8")).cells
     assert cells["fusion", "kalman", "optimum_rmse_deg_s"] == (0.0013, "0.00130")
+    assert cells["fusion", "kalman", "optimum_ratio"] == (0.00234567 / 0.0013, "1.80")
+    assert cells["sensors", "mhd_ars", "optimum_ratio"] == (None, "—")
 
 
 def test_report_is_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -64,8 +64,8 @@ def usable_periods(n_time: int, sample_rate_hz: float, periods: Sequence[float] 
     return tuple(p for p in periods if p * sample_rate_hz >= _SAMPLES and _CYCLES * p <= duration)
 
 
-def sines(t: FloatArray, periods: Sequence[float], amplitude: float) -> FloatArray:
-    r"""Return the sum of sines :math:`\sum_k A \sin(2 \pi t / T_k + k \varphi)`, with golden-angle phases.
+def sines(t: FloatArray, periods: Sequence[float], amplitudes: Sequence[float]) -> FloatArray:
+    r"""Return the sum of sines :math:`\sum_k A_k \sin(2 \pi t / T_k + k \varphi)`, with golden-angle phases.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def sines(t: FloatArray, periods: Sequence[float], amplitude: float) -> FloatArr
         Time [s].
     periods : sequence of float
         T_k [s].
-    amplitude : float
-        A of each [rad/s].
+    amplitudes : sequence of float
+        A_k [rad/s].
 
     Returns
     -------
@@ -82,7 +82,7 @@ def sines(t: FloatArray, periods: Sequence[float], amplitude: float) -> FloatArr
         Rate [rad/s].
     """
     rate = np.zeros(t.size)
-    for k, period in enumerate(periods):
+    for k, (period, amplitude) in enumerate(zip(periods, amplitudes, strict=True)):
         rate += amplitude * np.sin(2.0 * np.pi * t / period + k * _TURN)
     return rate
 
@@ -140,7 +140,7 @@ def survivor(compensate: Compensate, record: Record, plain: FloatArray, injected
 
 
 def line_gains(
-    survived: FloatArray, sample_rate_hz: float, periods: Sequence[float], amplitude: float
+    survived: FloatArray, sample_rate_hz: float, periods: Sequence[float], amplitudes: Sequence[float]
 ) -> tuple[LineGain, ...]:
     """Return gain and phase of each sine of `sines` in what survived, all fitted together with a constant.
 
@@ -152,14 +152,14 @@ def line_gains(
         [Hz].
     periods : sequence of float
         [s].
-    amplitude : float
-        Of each sine that went in [rad/s].
+    amplitudes : sequence of float
+        Of the sines that went in [rad/s].
     """
     t = sample_times(0, survived.size, sample_rate_hz)
     angles = [2.0 * np.pi * t / period + k * _TURN for k, period in enumerate(periods)]
     columns = np.stack([f(angle) for angle in angles for f in (np.sin, np.cos)] + [np.ones(t.size)], axis=1)
-    solution: FloatArray = np.linalg.lstsq(columns, survived / amplitude, rcond=None)[0]
-    gains: ComplexArray = solution[:-1:2] + 1j * solution[1:-1:2]
+    solution: FloatArray = np.linalg.lstsq(columns, survived, rcond=None)[0]
+    gains: ComplexArray = (solution[:-1:2] + 1j * solution[1:-1:2]) / np.asarray(amplitudes)
     return tuple(
         LineGain(period, float(abs(gain)), float(np.angle(gain))) for period, gain in zip(periods, gains, strict=True)
     )

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 DRIFT_PERIOD = 900.0  # s
 LEAST_GAIN = 0.9
 LEAST_ORACLE_RATIO = 0.7
-# Sines small against the noise of a reading (0.047 deg/h at 1 Hz), so that a method that adapts to the noise does not take them for it; the step
-# about the size of the drift.
-SINE, STEP = 0.01 * DEG_H, 0.05 * DEG_H  # rad/s
+# Fast sines are small against the noise of a reading (0.047 deg/h at 1 Hz), so that a method that adapts to the noise does not take them for
+# it; slow ones and the step are about the size of the drift.
+FAST_SINE, SLOW_SINE, STEP = 0.01 * DEG_H, 0.05 * DEG_H, 0.05 * DEG_H  # rad/s
 
 
 @dataclass(frozen=True)
@@ -180,8 +180,9 @@ def _survival(
     """Return what survives of sines, of a step and of Earth-rate steps."""
     t = sample_times(0, record.rate.size, record.sample_rate_hz)
     tell("compensating it with known sines added")
-    survived = survivor(compensate, record, plain, sines(t, periods, SINE))
-    gains = line_gains(survived, record.sample_rate_hz, periods, SINE)
+    amplitudes = [SLOW_SINE if period >= DRIFT_PERIOD else FAST_SINE for period in periods]
+    survived = survivor(compensate, record, plain, sines(t, periods, amplitudes))
+    gains = line_gains(survived, record.sample_rate_hz, periods, amplitudes)
 
     def share(name: str, known: FloatArray) -> float | None:
         tell(f"compensating it with {name} added")

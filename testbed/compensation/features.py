@@ -77,8 +77,8 @@ class Features:
     lags : tuple of float
         Time constants of the low-passes, increasing [s].
     plays : tuple of float
-        Half widths of the play operators [K]. None by default: they helped after no number of cycles and cost a
-        factor of two after one (docs/compensation_models.md).
+        Half widths of the play operators [K]. None by default: under one penalty with the rest they cost a factor of two
+        after one cycle (docs/compensation_models.md); the method `process` gives them a prior of their own.
     least_significant : float
         Step of the thermometer [K].
     slope_error : float

@@ -34,6 +34,7 @@ METHODS: dict[str, tuple[str, Fit, Features]] = {
     "gradient": ("polynomial", training.fit_coloured, Features()),
     "lssvm": ("lssvm", training.fit_lssvm, Features()),
     "polynomial": ("polynomial", training.fit_polynomial, Features(lags=())),
+    "process": ("polynomial", training.fit_process, Features(plays=(3.0, 10.0))),
 }
 
 
@@ -69,8 +70,8 @@ class DriftModel:
     mean_rate : float
         Mean of the training rates [rad/s]: Earth rate and constant bias. For information; it is never subtracted.
     blocked_error : float
-        Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` of what is new in
-        each row [rad/s].
+        Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` and `process` of what
+        is new in each row [rad/s].
     features : Features
         What is formed of the temperature.
     scaling : Scaling
@@ -198,7 +199,7 @@ def train(
 
     The mean over all cycles is taken off before and given back to nobody: the drift is zero on average over the training rows, so
     Earth rate and constant bias stay in the compensated rate. A rate that changes within a cycle is taken for drift; one that
-    changes between cycles (bias at turn-on) is not by `gradient`, where each cycle has a constant of its own.
+    changes between cycles (bias at turn-on) is not by `gradient` and `process`, where each cycle has a constant of its own.
 
     Parameters
     ----------
@@ -206,7 +207,8 @@ def train(
         Training records at one sample rate.
     method : str
         `gradient` (least squares under 1/f noise in powers of T, slope and gradient features), `lssvm` (the paper's machine on
-        the same features), or `polynomial` (the baseline: ordinary least squares without gradients).
+        the same features), `polynomial` (the baseline: ordinary least squares without gradients), or `process` (`gradient` with
+        hysteresis, a Gaussian process with priors by likelihood).
     features : Features, optional
         Other features than the method's own.
     seed : int

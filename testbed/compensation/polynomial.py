@@ -1,4 +1,4 @@
-"""Least squares in the temperature features: with powers of T, dT/dt and T dT/dt the polynomial baseline, with gradients more."""
+"""Least squares in the temperature features, and how much to believe before any: penalties by likelihood."""
 
 from __future__ import annotations
 
@@ -6,11 +6,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import minimize
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from testbed.signals import FloatArray
+
+# The search for prior variances stays within e^-12 .. e^12 of the noise's: beyond, a weight is zero or free.
+_SPAN = 12.0
 
 
 @dataclass(frozen=True)
@@ -87,3 +93,52 @@ def block_residuals(U: FloatArray, y: FloatArray, ridge: FloatArray, blocks: Seq
         H = half[:, rows].T @ half[:, rows]
         left_out[rows] = np.linalg.solve(np.eye(len(H)) - H, residuals[rows])
     return left_out
+
+
+def likeliest_ridge(U: FloatArray, y: FloatArray, group: NDArray[np.intp]) -> FloatArray:
+    r"""Return the penalties under which the target is most likely: a Gaussian process, linear in its features.
+
+    Weights of group g have the prior N(0, p_g s^2), those of group -1 a flat one; the noise is white with variance s^2. With the flat
+    columns projected out of U and y, m rows left and both s^2 and the weights integrated or maximised out,
+
+    .. math:: -2 \ln L = m \ln(y'y - b' M^{-1} b) + \ln |P M|, \quad M = U'U + P^{-1},\; b = U'y
+
+    is least; the penalties are 1 / p_g, and 0 for the flat ones.
+
+    Parameters
+    ----------
+    U : ndarray, shape (n_row, n_column)
+        Regressors [-].
+    y : ndarray, shape (n_row,)
+        Target, any unit.
+    group : ndarray of int, shape (n_column,)
+        Group of each column; -1 is flat.
+
+    Returns
+    -------
+    ndarray, shape (n_column,)
+        rho of `penalised`.
+
+    References
+    ----------
+    Rasmussen and Williams, "Gaussian Processes for Machine Learning" (2006), equation (2.43).
+    """
+    flat = group < 0
+    Q = np.linalg.qr(U[:, flat])[0]
+    free, target = U[:, ~flat] - Q @ (Q.T @ U[:, ~flat]), y - Q @ (Q.T @ y)
+    A, b, total = free.T @ free, free.T @ target, target @ target
+    dof = y.size - int(flat.sum())
+
+    def unlikelihood(log_variance: FloatArray) -> float:
+        root = np.exp(0.5 * log_variance)[group[~flat]]
+        L = np.linalg.cholesky(np.outer(root, root) * A + np.eye(root.size))
+        half = np.linalg.solve(L, root * b)
+        # A target that is zero throughout is likely under any variance.
+        left = max(total - half @ half, np.finfo(float).tiny)
+        return float(0.5 * dof * np.log(left) + np.log(np.diag(L)).sum())
+
+    n_group = int(group.max()) + 1
+    found = minimize(unlikelihood, np.zeros(n_group), method="L-BFGS-B", bounds=[(-_SPAN, _SPAN)] * n_group)
+    ridge = np.zeros(group.size)
+    ridge[~flat] = np.exp(-found.x)[group[~flat]]
+    return ridge

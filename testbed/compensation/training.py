@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Rows are means over at least this time [s], and longer for a machine whose cost is cubic.
 _AVERAGE = 100.0
-MOST_SUPPORT = 900
+MOST_SUPPORT = 300
 # Standardised features: a kernel narrower than half a standard deviation learns time, one wider than a thousand is flat.
 _GAMMAS, _WIDTHS2 = (1e-2, 1e6), (0.3, 1e6)
 # Smaller ones change nothing but let a cycle that leaves a feature undetermined do so.
@@ -53,6 +53,8 @@ class Rows:
         Rows of each cycle.
     average : float
         Time that a row is the mean of [s].
+    n_play : int
+        How many of the features are play operators; they are the last.
     """
 
     Z: FloatArray
@@ -62,6 +64,7 @@ class Rows:
     folds: list[slice]
     cycles: list[slice]
     average: float
+    n_play: int
 
 
 def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> Rows:
@@ -106,7 +109,7 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
     ends = np.cumsum([0, *(len(part) for part in X)])
     whole = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
     folds = [fold for rows in whole for fold in _folds(rows, block / average)]
-    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds, whole, average)
+    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds, whole, average, len(features.plays))
 
 
 def block_means(values: FloatArray, n_mean: int) -> FloatArray:
@@ -162,6 +165,24 @@ def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
     n_cycle = len(rows.cycles)
     weights, error = _least_squares(U, v, n_cycle, rows.folds)
     return Polynomial(weights[n_cycle:], 0.0), error
+
+
+def fit_process(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
+    """Fit as `fit_coloured`, but as a Gaussian process: prior variances of the largest likelihood, play operators with one of their own.
+
+    So hysteresis is believed only as far as the cycles show it.
+
+    Parameters
+    ----------
+    rows : Rows
+        Training rows.
+    """
+    U, v = whiten(rows.Z, rows.y, rows.cycles, _CORNER * rows.average)
+    n_cycle, n_feature = len(rows.cycles), rows.Z.shape[1]
+    group = np.repeat([-1, 0, 1], [n_cycle, n_feature - rows.n_play, rows.n_play])
+    ridge = polynomial.likeliest_ridge(U, v, group)
+    error = _rms(polynomial.block_residuals(U, v, ridge, rows.folds))
+    return Polynomial(polynomial.penalised(U, v, ridge)[n_cycle:], 0.0), error
 
 
 def _least_squares(U: FloatArray, y: FloatArray, n_free: int, folds: list[slice]) -> tuple[FloatArray, float]:

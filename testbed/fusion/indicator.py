@@ -181,7 +181,7 @@ class FrequencyIndicator:
     Raises
     ------
     ValueError
-        If there are not two sensors or a rate does not fit the lags.
+        If there are not two sensors, a rate does not fit the lags, or memory or margin is out of range.
     """
 
     def __init__(
@@ -192,6 +192,9 @@ class FrequencyIndicator:
         memory: float = 1.0,
         margin: float = 1.0,
     ) -> None:
+        if not (memory > 0.0 and margin >= 0.0):
+            msg = f"memory, margin: expected above 0 s and at least 0, got {memory:g} and {margin:g}"
+            raise ValueError(msg)
         if len(sample_rate_hz) != 2:
             msg = f"sample_rate_hz: expected two sensors, got {list(sample_rate_hz)}"
             raise ValueError(msg)

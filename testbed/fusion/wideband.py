@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from testbed.fusion.bank_kernel import BANK_HEADER_ROWS, BANK_ROWS, LEVEL, REFUSED, bank_kernel
 from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FormParameters
-from testbed.fusion.kernels import (
-    BANK_HEADER_ROWS,
-    BANK_ROWS,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    LEVEL,
-    RATE,
-    REFUSED,
-    STD,
-    bank_kernel,
-)
+from testbed.fusion.kernels import INNOVATION, INNOVATION_VARIANCE, RATE, STD
 from testbed.fusion.model import build_model
 from testbed.units import PositiveDuration
 
@@ -74,8 +65,8 @@ class Wideband(BlockFilter):
 
     with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run side by side and
     differ in how fast a signal they expect. One that is too slow for the signal spoils its slow states, which take half a minute to
-    recover: it is given state and covariance of the best filter until it does better. A square beyond gate^2 counts by its logarithm. No band, no threshold on
-    the signal. Refused readings (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the
+    recover: it is given state and covariance of the best filter until it does better. A square beyond gate^2 counts by its logarithm. No
+    band, no threshold on the signal. Refused readings (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the
     weighted mean of log10 q [rad^2/s^(2m+1)].
 
     Parameters

@@ -16,7 +16,7 @@ from testbed.report.figures import errors_figure, rates_figure, spectrum_figure,
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
 from testbed.report.numbers import fixed, plain, significant
 from testbed.report.svg import svg_text
-from testbed.report.words import METRICS, claims, further, honesty, ratio_to_floor, summary
+from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
 from testbed.store import write_text
 
 REPORT = "report.html"
@@ -64,7 +64,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
-    environment.globals |= {"ratio_to_floor": ratio_to_floor, "honesty": honesty, "line_error": line_error}
+    environment.globals |= {"ratios": RATIOS, "over_bound": over_bound, "honesty": honesty, "line_error": line_error}
     return environment.get_template("report.html.j2").render(
         metrics=metrics,
         names=_shown_metrics(metrics),
@@ -88,7 +88,8 @@ def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
         for key in ("peak_error_deg_s", "optimum_rmse_deg_s")
         if all(getattr(source, key) is None for source in sources)
     ]
-    return {key: name for key, name in METRICS.items() if key not in unknown}
+    # A ratio to an optimum that is not known is no column either.
+    return {key: name for key, name in METRICS.items() if {key, RATIOS.get(key)}.isdisjoint(unknown)}
 
 
 def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:

@@ -19,8 +19,11 @@ METRICS = {
     "floor_rmse_deg_s": "noise floor",
     "ratio": "RMSE / floor",
     "optimum_rmse_deg_s": "optimum",
+    "optimum_ratio": "RMSE / optimum",
     "mean_std_deg_s": "predicted std",
 }
+# Columns that are the RMSE over a bound.
+RATIOS = {"ratio": "floor_rmse_deg_s", "optimum_ratio": "optimum_rmse_deg_s"}
 
 
 def _best(sources: Mapping[str, SourceMetrics]) -> str | None:
@@ -28,11 +31,10 @@ def _best(sources: Mapping[str, SourceMetrics]) -> str | None:
     return min(rmse, key=lambda name: rmse[name]) if rmse else None
 
 
-def ratio_to_floor(source: SourceMetrics) -> float | None:
-    """Return RMSE over floor [-], None where either is undefined or the floor is zero."""
-    if source.rmse_deg_s is None or not source.floor_rmse_deg_s:
-        return None
-    return source.rmse_deg_s / source.floor_rmse_deg_s
+def over_bound(source: SourceMetrics, column: str) -> float | None:
+    """Return RMSE over the bound of a column of RATIOS [-], None where either is undefined or the bound is zero."""
+    bound = getattr(source, RATIOS[column])
+    return source.rmse_deg_s / bound if source.rmse_deg_s is not None and bound else None
 
 
 def summary(metrics: RunMetrics, digest: Digest) -> str:
@@ -64,7 +66,7 @@ def _accuracy(metrics: RunMetrics) -> list[str]:
         text.append(
             f"That is {compared} than the error of the best sensor alone ({sensor}, {significant(alone)} deg/s)."
         )
-    ratio = ratio_to_floor(metrics.fusion[best])
+    ratio, to_optimum = (over_bound(metrics.fusion[best], column) for column in RATIOS)
     if ratio is not None:
         known = (
             "which no filter of an unknown signal can get below"
@@ -72,6 +74,8 @@ def _accuracy(metrics: RunMetrics) -> list[str]:
             else "so what it assumes of the signal pays here"
         )
         text.append(f"It is {significant(ratio)} times the noise floor, {known}.")
+    if to_optimum is not None:
+        text.append(f"It is {significant(to_optimum)} times the optimum, the best settled filter for this very signal.")
     return text
 
 

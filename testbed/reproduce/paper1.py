@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.budget import signal_optima
+from testbed.metrics import ErrorMetrics, floor_rmse
 from testbed.reproduce.paper1_defects import table_ii_defects
-from testbed.reproduce.paper1_runs import SIGNALS, Protocol, errors, outputs, presets, truth
+from testbed.reproduce.paper1_runs import BASE_HZ, FILTERS, SIGNALS, Protocol, errors, outputs, presets, truth
+from testbed.signals import sample_times
 from testbed.store import write_text
 
 if TYPE_CHECKING:
@@ -38,7 +41,17 @@ PAPER: dict[str, dict[str, float]] = {
     },
     "mixed": {"shakf": 0.1482, "arw_shakf": 0.0143, "arw_shakf_literal": 0.0143},
 }
-COLUMNS = ("rmse_deg_s", "rmse_lowest_deg_s", "rmse_highest_deg_s", "rmse_aligned_deg_s", "paper_rmse_deg_s")
+COLUMNS = (
+    "rmse_deg_s",
+    "rmse_lowest_deg_s",
+    "rmse_highest_deg_s",
+    "rmse_aligned_deg_s",
+    "paper_rmse_deg_s",
+    "floor_rmse_deg_s",
+    "optimum_rmse_deg_s",
+)
+# Of the floor, as in a scenario that states none [Hz].
+BANDWIDTH_HZ = 1000.0
 
 
 def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[str]:
@@ -70,7 +83,9 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
 
 
 def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: Protocol) -> Iterator[str]:
-    """Write table_ii.csv and yield it line by line: medians over the seeds, lowest and highest RMSE, and the paper's number.
+    """Write table_ii.csv and yield it line by line: medians over the seeds, lowest and highest RMSE, the paper's number, floor and optimum.
+
+    The lines have floor and optimum as what the median is over them, the file in deg/s; they are those of filters.
 
     Parameters
     ----------
@@ -88,18 +103,38 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
     str
         One line.
     """
-    rows, sensors = [], presets()
+    rows, sensors, best = [], presets(), _bounds(rates, protocol)
     yield f"Table II: RMSE in deg/s, phase included; median over {seeds} seed(s)"
-    yield f"{'':8s}{'':20s}{'median':>10s}{'lowest':>10s}{'highest':>10s}{'aligned':>10s}{'paper':>10s}"
+    yield f"{'':8s}{'':20s}{'median':>10s}{'lowest':>10s}{'highest':>10s}{'aligned':>10s}{'paper':>10s}{'x floor':>10s}{'x optimum':>11s}"
     for signal, rate in rates.items():
         runs = [errors(outputs(rate, seed, sensors), rate, signal, protocol) for seed in range(1, seeds + 1)]
         for name in runs[0]:
-            rows.append((signal, name, *_statistics([run[name] for run in runs]), PAPER[signal].get(name)))
-            yield f"{signal:8s}{name:20s}" + "".join(f"{_text(value, 4):>10s}" for value in rows[-1][2:])
+            found = *_statistics([run[name] for run in runs]), PAPER[signal].get(name)
+            bounds = best[signal] if name in FILTERS else (None, None)
+            rows.append((signal, name, *found, *bounds))
+            floor, least = (_text(found[0] / bound if bound else None, 1) for bound in bounds)
+            yield f"{signal:8s}{name:20s}" + "".join(f"{_text(v, 4):>10s}" for v in found) + f"{floor:>10s}{least:>11s}"
     text = "\n".join(
         ",".join(map(str, (signal, name, *(_text(v, 9) for v in values)))) for signal, name, *values in rows
     )
     write_text(out / "table_ii.csv", f"signal,name,{','.join(COLUMNS)}\n{text}\n")
+
+
+def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tuple[float, float]]:
+    """Return floor and optimum of each signal [deg/s], of its lines as they are in the truth after settle."""
+    sensors, first, lines = presets(), round(protocol.settle * BASE_HZ), []
+    for signal, rate in rates.items():
+        judged = ErrorMetrics([sine.frequency for sine in SIGNALS[signal]])
+        judged.add(sample_times(first, rate.size - first, BASE_HZ), rate[first:], rate[first:])
+        lines.append(judged.truth_lines())
+    floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
+    best = signal_optima(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()}, lines)
+    # Both sensors are rational and see every frequency between them.
+    assert floor is not None
+    assert best is not None
+    return {
+        signal: (float(np.rad2deg(floor)), float(np.rad2deg(one.rmse))) for signal, one in zip(rates, best, strict=True)
+    }
 
 
 def _statistics(runs: list[tuple[float, float]]) -> tuple[float, float, float, float]:

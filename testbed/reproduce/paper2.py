@@ -60,7 +60,7 @@ class Protocol:
     observe: float = 1.0
     linear_observe: float = 10.0
     warm_up: float = 300.0
-    standstill: float = 120.0
+    standstill: float = 600.0
 
 
 def switched_on(**parameters: Any) -> AllanSrkf:

@@ -24,6 +24,7 @@ from testbed.compensation.model_only import train
 from testbed.compensation.record import Record
 from testbed.models.earth import SPEED
 from testbed.models.temperature import TemperatureProfile
+from testbed.reproduce.paper3_page import page
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
 from testbed.store import write_text
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    from testbed.audit.leak import Audit
     from testbed.compensation.model_only import DriftModel
     from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
@@ -163,7 +165,7 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
         ("gradient", "gradient", two),
     ):
         model = train(cycles, method=method)
-        yield Case(name, f"{len(cycles)} other cycle(s)", _applied(model))
+        yield Case(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
 
 
 def _paper(options: paper3.PaperOptions, seed: int) -> Compensate:
@@ -175,7 +177,7 @@ def _applied(model: DriftModel) -> Compensate:
 
 
 def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[str]:
-    """Write table_2.csv and the audits of the first seed, and yield the table line by line.
+    """Write table_2.csv, paper3.html and the audits of the first seed, and yield the table line by line.
 
     Parameters
     ----------
@@ -193,6 +195,8 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
     """
     protocol = protocol or Protocol()
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    folders: dict[str, str] = {}
+    audits: dict[str, Audit] = {}
     for seed in range(1, seeds + 1):
         thermal = cycle("paper", seed, protocol.sample_rate_hz)
         for case in cases(seed, protocol):
@@ -200,10 +204,17 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
             found.setdefault((case.name, case.trained_on), []).append({**summary(audited.audit), "seconds": seconds})
             yield f"seed {seed}: {case.name}, trained on {case.trained_on}: {'leak' if audited.audit.leaks else 'no leak found'}"
             if seed == 1:
-                write_audit(audited, out / f"audit_{case.name}_{case.trained_on}".translate(_PLAIN))
+                folders[_title(case)] = f"audit_{case.name}_{case.trained_on}".translate(_PLAIN)
+                audits[_title(case)] = audited.audit
+                write_audit(audited, out / folders[_title(case)])
     rows = [(*key, *_medians(runs)) for key, runs in found.items()]
     write_text(out / "table_2.csv", _csv(rows, found))
+    write_text(out / "paper3.html", page(_shown(rows, found), audits, list(folders.values()), seeds))
     yield from _printed(rows, found, seeds)
+
+
+def _title(case: Case) -> str:
+    return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
 _PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
@@ -241,6 +252,25 @@ def _csv(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str
     blank = ["" for _ in ("trained_on", "leaks", *COLUMNS)]
     lines += [",".join([name, *blank, *map(_text, values)]) for name, values in TABLE_2.items() if name not in ours]
     return "\n".join(lines) + "\n"
+
+
+def _shown(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    """Return the rows of the page; the paper's methods that are not ours last."""
+    shown = []
+    for name, trained_on, *values in rows:
+        leaks = sum(not run["passed"] for run in found[name, trained_on])
+        shown.append(
+            {"method": name, "trained_on": trained_on, "leaks": leaks, **dict(zip(COLUMNS, values, strict=True))}
+        )
+    ours = {row["method"] for row in shown}
+    blank = {"trained_on": "", "leaks": None, **dict.fromkeys(COLUMNS)}
+    shown += [{"method": name, **blank} for name in TABLE_2 if name not in ours]
+    return [{**row, **_paper_of(row["method"])} for row in shown]
+
+
+def _paper_of(name: str) -> dict[str, float | None]:
+    _, b, n, _ = TABLE_2.get(name, (None,) * 4)
+    return {"paper_b": b, "paper_n": n}
 
 
 def _printed(

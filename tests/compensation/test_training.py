@@ -8,9 +8,9 @@ from scipy.linalg import block_diag, solve_triangular
 
 from testbed.compensation.features import Features
 from testbed.compensation.flicker import noise_root, whiten
-from testbed.compensation.polynomial import Polynomial, block_residuals, penalised
+from testbed.compensation.polynomial import Polynomial, block_residuals, likeliest_ridge, penalised
 from testbed.compensation.record import Record
-from testbed.compensation.training import block_means, fit_coloured, fit_polynomial, gather
+from testbed.compensation.training import block_means, fit_coloured, fit_polynomial, fit_process, gather
 from tests.compensation.thermal_record import WHITE, flicker
 
 
@@ -60,11 +60,12 @@ def test_whitening_makes_the_noise_of_a_gyro_white(rng):
     assert np.corrcoef(rows[1:], rows[:-1])[0, 1] > 0.5
 
 
-def test_features_that_determine_nothing_get_no_weight(rng):
-    """A chamber that never moved: only rounding is left of every feature, and the drift is zero."""
-    still = Record(1e-7 + 1e-9 * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
-    rows = gather([still], Features(), block=7200.0)
-    for fit in (fit_polynomial, fit_coloured):
+@pytest.mark.parametrize("noise", [1e-9, 0.0])
+def test_features_that_determine_nothing_get_no_weight(rng, noise):
+    """A chamber that never moved: only rounding is left of every feature, and the drift is zero; also of a rate that never moved."""
+    still = Record(1e-7 + noise * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
+    rows = gather([still], Features(plays=(3.0,)), block=7200.0)
+    for fit in (fit_polynomial, fit_coloured, fit_process):
         assert np.allclose(fit(rows)[0].weights, 0.0, rtol=0.0, atol=1e-15)
 
 
@@ -88,3 +89,40 @@ def test_cycles_that_cannot_be_blocked_are_refused(rng):
     for cycles in ([], [record(rng), record(rng, sample_rate_hz=2.0)], [record(rng, 14_000)]):
         with pytest.raises(ValueError, match="cycles"):
             gather(cycles, Features(), block=7200.0)
+
+
+@pytest.mark.oracle
+def test_the_likeliest_ridge_is_the_top_of_the_likelihood_of_a_gaussian_process(rng):
+    """-2 ln L from the covariance of the target itself, rows by rows, noise variance at its best, no projection and no identity."""
+    U, group = rng.normal(size=(60, 5)), np.array([-1, 0, 0, 1, 1])
+    U[:, 0] = 1.0
+    y = U @ np.array([7.0, 1.0, -2.0, 0.2, -0.1]) + rng.normal(size=60)
+
+    def unlikelihood(ridge):
+        # The constant's flat prior by an orthonormal complement: contrasts do not see it.
+        contrasts = np.linalg.svd(U[:, :1])[0][:, 1:].T
+        free = contrasts @ U[:, 1:]
+        covariance = np.eye(59) + free / ridge[1:] @ free.T
+        seen = contrasts @ y
+        return 59 * np.log(seen @ np.linalg.solve(covariance, seen)) + np.linalg.slogdet(covariance)[1]
+
+    found = likeliest_ridge(U, y, group)
+    assert found[0] == 0.0
+    assert found[1] == found[2] < found[3] == found[4]
+    for other in (0, 1):
+        for factor in (0.9, 1.1):
+            assert unlikelihood(np.where(group == other, factor * found, found)) > unlikelihood(found)
+
+
+def test_the_process_has_a_prior_for_hysteresis_alone(rng):
+    """A drift by temperature without hysteresis; the groups from the names of the features. With one group the weights differ."""
+    features = Features(lags=(), plays=(3.0, 10.0))
+    still = record(rng)
+    moved = Record(still.rate + 1e-9 * (still.temperature - 293.15), still.temperature, 1.0)
+    rows = gather([moved, moved], features, block=7200.0)
+    U, v = whiten(rows.Z, rows.y, rows.cycles, 1.7)
+    group = np.array([-1, -1, *(int(name.startswith("play")) for name in features.names)])
+    expected, alone = (penalised(U, v, likeliest_ridge(U, v, each))[2:] for each in (group, np.minimum(group, 0)))
+    # Both searches stop near a flat top: a corner of 1.7 and of 100 x 0.017 differ by rounding, prior variances by some 10 %.
+    assert np.allclose(fit_process(rows)[0].weights, expected, rtol=0.0, atol=1e-4 * np.abs(expected).max())
+    assert np.abs(expected[-2:]).max() < 0.5 * np.abs(alone[-2:]).max()

@@ -22,7 +22,9 @@ PROGRAMMES = {
     "down": [(None, 7200), (-30, 0.1), (60, 0.1)],
     "slow_up": [(None, 3600), (55, 0.08), (None, 5400), (-25, 0.09), (None, 5400)],
     "mixed_down": [(None, 5400), (-25, 0.1), (None, 3600), (55, 0.09), (20, 0.1)],
+    "two_rates": [(None, 7200), (60, 0.15), (-30, 0.1), (20, 0.15)],
 }
+UNSEEN = ("up", "down", "slow_up", "mixed_down")
 
 
 @dataclass(frozen=True)

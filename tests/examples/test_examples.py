@@ -6,6 +6,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -109,3 +110,12 @@ def test_example_prints_and_draws(name: str, options: list[str], tmp_path: Path)
     )
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert len(done.stdout.splitlines()) > 8
+
+
+def test_a_filter_just_switched_on_is_less_linear_than_a_settled_one() -> None:
+    """Its gain of the gyro falls as 1/t from the whole band on: after 20 s 20 times narrower, so a factor of two is far inside."""
+    program = load("paper2_linearity")
+    short = replace(program.PAPER, linear_amplitudes=(10.0, 20.0, 30.0, 40.0, 50.0), linear_observe=2.0, settle=0.1)
+    fresh, settled = (program.ratios(1, replace(short, warm_up=seconds)) for seconds in (0.0, 20.0))
+    assert fresh.shape == (1,)
+    assert fresh[0] > settled[0] > 0.0

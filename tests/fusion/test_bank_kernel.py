@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.fusion.kernels import (
-    gain_root,
-    innovate_root_bank,
-    predict_root,
-    predict_root_bank,
-    start_again,
-    update_root,
-    update_root_bank,
-)
+from testbed.fusion.bank_kernel import innovate_root_bank, predict_root_bank, start_again, update_root_bank
+from testbed.fusion.kernels import gain_root, predict_root, update_root
 from testbed.signals import random_stream
 
 

@@ -148,3 +148,9 @@ def test_it_wants_two_sensors_with_rates_that_fit() -> None:
 
 def test_a_block_may_be_empty() -> None:
     assert FrequencyIndicator(BELIEF, RATES).process({"mems_gyro": [], "mhd_ars": []}).by_sensors.size == 0
+
+
+@pytest.mark.parametrize("wrong", [{"memory": 0.0}, {"memory": float("nan")}, {"margin": -1.0}])
+def test_it_refuses_a_memory_or_margin_without_meaning(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="memory, margin: expected"):
+        FrequencyIndicator(BELIEF, RATES, **wrong)

@@ -233,3 +233,10 @@ def test_a_sensor_without_output_noise_is_refused() -> None:
     belief = {"mems_gyro": SensorBelief(numerator=(1.0,), denominator=(1.0, 1.0), input_noise=1e-5)}
     with pytest.raises(ValueError, match="belief: expected an output_noise"):
         settled_filters(belief, {"mems_gyro": 100.0}, order=1, q=np.ones(1))
+
+
+@pytest.mark.parametrize(("order", "written"), [(1, 0.0070), (2, 0.0022), (3, 0.0014)])
+def test_why_the_signal_model_is_of_order_three(order: int, written: float) -> None:
+    """The figures of docs/wideband.md, 1 deg/s at 100 Hz, two digits."""
+    found = optimum(load_belief("identified"), RATES, [(100.0, DEG)], orders=(order,)).rmse / DEG
+    assert round(found, 4) == written

@@ -37,6 +37,18 @@ def test_it_is_the_kalman_filter_once_that_has_settled() -> None:
         np.testing.assert_allclose(fixed.diagnostics[key][-5000:], kalman.diagnostics[key][-5000:], rtol=1e-5)
 
 
+def test_the_cycle_of_gains_follows_the_clock_and_not_the_first_reading() -> None:
+    """The gyro is due at every tenth step from t = 0, whether or not readings came before: claims repeat with that phase."""
+    readings = {"mems_gyro": np.zeros(30), "mhd_ars": np.zeros(300)}
+    late = {"mems_gyro": np.full(30, np.nan), "mhd_ars": np.full(300, np.nan)}
+    late["mhd_ars"][13:], late["mems_gyro"][2:] = 0.0, 0.0
+    whole, begun = (SteadyState(QUICK, RATES, SteadyStateParameters()).process(one) for one in (readings, late))
+    assert np.unique(whole.std[20:30]).size == 10
+    for key in ("innovation_variance_mhd_ars", "innovation_variance_mems_gyro"):
+        assert np.array_equal(begun.diagnostics[key][20:], whole.diagnostics[key][20:], equal_nan=True)
+    assert np.array_equal(begun.std[20:], whole.std[20:])
+
+
 def test_it_is_best_at_the_signal_it_was_made_for(reference: Any) -> None:
     belief = load_belief("eq39")
     error = {}

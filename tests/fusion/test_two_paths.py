@@ -241,6 +241,19 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
 
 
 @pytest.mark.parametrize("cls", FILTERS)
+def test_drift_is_forgotten_once_the_slow_sensor_is_back(cls: Any) -> None:
+    """Its variance falls by exp(-2 w t), w the slowest pole of the crossover: w_c of the first order, w_c / sqrt(2) of the loop."""
+    z = {"mems_gyro": np.zeros(4000), "mhd_ars": np.zeros(40_000)}
+    whole = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std
+    z["mems_gyro"][500:2000] = np.nan
+    extra = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std ** 2 - whole**2
+    assert extra[19_999] > 0.0
+    w = np.pi * {Complementary: 1.0, Blending: np.sqrt(0.5)}[cls]
+    # 0.6 s after; the difference of two variances keeps some digits less.
+    assert extra[32_000] / extra[20_000] == pytest.approx(np.exp(-2.0 * w * 0.6), rel=1e-3)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
 def test_a_lost_fast_sensor_holds_the_rate(cls: Any) -> None:
     rng = np.random.default_rng(1)
     z = {"mhd_ars": 1e-3 * rng.standard_normal(30_000), "mems_gyro": 1e-3 * rng.standard_normal(3000)}

@@ -30,11 +30,11 @@ def rmse(estimate: FloatArray, truth: FloatArray, last: float) -> float:
     return float(np.sqrt(np.mean((estimate[-n:] - truth[-n:]) ** 2)) / DEG)
 
 
-def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tuple[FloatArray, FloatArray]:
-    """Rate and std of the bank with plain matrices, one filter after the other; nothing is refused."""
+def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tuple[FloatArray, ...]:
+    """Rate and std of the bank, innovation of the MHD ARS and its variance, with plain matrices, one filter after the other; nothing is refused."""
     q = p.q * 10.0 ** np.linspace(0.0, p.decades, p.filters)
     n_time = readings["mhd_ars"].size
-    x_all, P_all, loglik = np.empty((q.size, n_time)), np.empty((q.size, n_time)), np.empty((q.size, n_time))
+    x_all, P_all, loglik, e_all, C_all = np.empty((5, q.size, n_time))
     for m, one in enumerate(q):
         model = build_model(BELIEF, RATES, order=p.order, q=float(one))
         x, P = np.zeros(len(model.F)), model.P0.copy()
@@ -50,15 +50,20 @@ def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tupl
             x, P = x + K @ e, A @ P @ A.T + K @ R @ K.T
             x_all[m, k], P_all[m, k] = x[0], P[0, 0]
             loglik[m, k] = -0.5 * (e @ np.linalg.solve(C, e) + np.linalg.slogdet(C)[1])
-    rate, std = np.empty(n_time), np.empty(n_time)
+            e_all[m, k], C_all[m, k] = e[-1], C[-1, -1]
+    rate, std, innovation, variance = np.empty((4, n_time))
+    w = np.full(q.size, 1.0 / q.size)
     age = np.arange(n_time)
     for k in range(n_time):
+        # Foreseen with the weights of before this reading.
+        innovation[k] = w @ e_all[:, k]
+        variance[k] = w @ (C_all[:, k] + (e_all[:, k] - innovation[k]) ** 2)
         s = loglik[:, : k + 1] @ np.exp(-(age[k] - age[: k + 1]) / (20_000.0 * p.memory))
         w = np.exp(s - s.max())
         w /= w.sum()
         rate[k] = w @ x_all[:, k]
         std[k] = np.sqrt(w @ (P_all[:, k] + (x_all[:, k] - rate[k]) ** 2))
-    return rate, std
+    return rate, std, innovation, variance
 
 
 @pytest.mark.oracle
@@ -70,10 +75,21 @@ def test_bank_equals_its_equations(reference: Any, order: int) -> None:
         order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3, restart=np.inf
     )
     ours = run(readings, **p.model_dump())
-    rate, std = literal_bank(readings, p)
+    rate, std, innovation, variance = literal_bank(readings, p)
     # eps times the 1e8 by which the first readings shrink P, as for the single filter.
     np.testing.assert_allclose(ours.rate, rate, rtol=0.0, atol=1e-8 * DEG)
     np.testing.assert_allclose(ours.std, std, rtol=1e-6)
+    np.testing.assert_allclose(ours.diagnostics["innovation_mhd_ars"], innovation, rtol=0.0, atol=1e-8 * DEG)
+    np.testing.assert_allclose(ours.diagnostics["innovation_variance_mhd_ars"], variance, rtol=1e-6)
+
+
+def test_a_stuck_sensor_is_refused_from_the_reading_that_was_promised_on(reference: Any) -> None:
+    """After `stuck_after` exact repetitions, and only until it changes again."""
+    readings = reference.readings(reference.sines((10.0, 1.0), duration=0.1), 7)
+    readings["mhd_ars"][1000:1020] = readings["mhd_ars"][1000]
+    refused = run(readings, stuck_after=5).diagnostics["refused_mhd_ars"]
+    assert refused[1004] == 0.0
+    assert list(np.flatnonzero(np.diff(refused)) + 1) == list(range(1005, 1020))
 
 
 def test_the_weights_follow_the_signal(reference: Any) -> None:

@@ -96,6 +96,15 @@ def test_one_command_writes_both_tables_and_every_figure_with_its_numbers(tmp_pa
     rows = table(tmp_path / "table_ii.csv")
     assert float(rows["4 Hz", "shakf"]["paper_rmse_deg_s"]) == 0.1831
     assert rows["mixed", "mhd_ars"]["paper_rmse_deg_s"] == ""
+    assert rows["mixed", "mhd_ars"]["optimum_rmse_deg_s"] == rows["mixed", "mhd_ars"]["floor_rmse_deg_s"] == ""
+    (line,) = [line for line in lines if line.startswith("10 Hz   kalman")]
+    row = rows["10 Hz", "kalman"]
+    for text, bound in zip(line.split()[-2:], ("floor_rmse_deg_s", "optimum_rmse_deg_s"), strict=True):
+        assert float(text) == pytest.approx(float(row["rmse_deg_s"]) / float(row[bound]), abs=0.06)
+    # A faster line of the same amplitude costs more; the fast one of the mixed signal is weaker than that at 10 Hz alone.
+    best = {signal: float(rows[signal, "kalman"]["optimum_rmse_deg_s"]) for signal in SIGNALS}
+    assert best["0.5 Hz"] < best["4 Hz"] < best["10 Hz"]
+    assert best["0.5 Hz"] < best["mixed"] < best["10 Hz"]
     figures = {f"figure_{i}.{kind}" for i in (2, *range(6, 16)) for kind in ("csv", "svg", "png")}
     assert {p.name for p in tmp_path.iterdir()} == figures | {
         "table_ii.csv",

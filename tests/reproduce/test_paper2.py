@@ -13,11 +13,12 @@ from typer.testing import CliRunner
 
 from testbed.cli import app
 from testbed.errors import ScenarioError
-from testbed.reproduce import run_paper
+from testbed.reproduce import PAPERS, SEEDS, run_paper
 from testbed.reproduce.paper2 import (
     CHANNELS,
     CLOCK_HZ,
     Protocol,
+    _claims,
     amplitudes,
     mhd_response,
     noise_density,
@@ -87,6 +88,21 @@ def test_tables_are_written_and_meet_the_targets(tmp_path: Path) -> None:
     assert "1 dB" in text
 
 
+def test_the_claims_are_those_of_the_measured_arrays() -> None:
+    """Ripple 0.02 / 1.01; the low band is what is below 1 Hz; linearity from 2 Hz on; noise against the input-referred MHD ARS, from its corner on."""
+    protocol = replace(FEW, scale_frequencies=(0.1, 10.0), linear_frequencies=(0.2, 2.0))
+    linear = np.array([[9.0, 9.0, 9.0], [3.0, 2.0, 1.0]])
+    freq, density = (
+        np.array([0.1, 10.0, 900.0]),
+        np.array([[1.0, 1.0, 9.0, 1.0], [1.0, 4.0, 2.0, 1.0], [1.0, 1.0, 9.0, 1.0]]),
+    )
+    ripple, low, straight, noise = list(_claims(protocol, np.array([1.0, 1.02]), linear, freq, density))[2:]
+    assert ripple.endswith(" 1.980 %")
+    assert "0.04000 +- 0" in low
+    assert straight.endswith("1.0e+00 (2.0e+00) %")
+    assert noise.endswith(" 3.01 dB")
+
+
 @pytest.mark.slow
 def test_without_a_clamp_the_scale_factor_depends_on_the_amplitude() -> None:
     """R as printed holds the signal: at 60 Hz the filter slows down with the amplitude; with the clamp it does not."""
@@ -117,6 +133,14 @@ def test_only_what_exists_is_promised(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="--out: expected a folder"):
         list(run_paper("paper2", 1, taken))
     assert CliRunner().invoke(app, ["reproduce", "paper2", "--seeds", "0"]).exit_code == 2
+
+
+def test_seeds_that_are_not_asked_for_are_the_papers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Table II's median and spread are over ten."""
+    assert SEEDS.keys() == PAPERS.keys()
+    monkeypatch.setattr("testbed.reproduce.paper1.report", lambda seeds, out: [f"{seeds} seeds in {out.name}"])
+    assert list(run_paper("paper1", None, tmp_path / "new")) == ["10 seeds in new"]
+    assert list(run_paper("paper1", 3, tmp_path / "new")) == ["3 seeds in new"]
 
 
 def settled_filter() -> tuple[Any, FloatArray, FloatArray]:
