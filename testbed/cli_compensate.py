@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from testbed.compensation import PAPER
+
 if TYPE_CHECKING:
     from testbed.thermal_records import Columns
 
@@ -17,7 +19,6 @@ app = typer.Typer(
 )
 
 LEAK = 1
-PAPER = "paper3"
 
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="Run folder, or text file with rate and temperature.")]
 Sources = Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Thermal cycles: run folders or text files.")]

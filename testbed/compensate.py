@@ -11,7 +11,7 @@ import numpy as np
 
 from testbed.audit.leak import audit
 from testbed.audit.page import Audited, write_audit
-from testbed.compensation import paper3
+from testbed.compensation import PAPER, paper3
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.store import failing_as_run_error, write_text
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from testbed.compensation.record import Record
     from testbed.signals import FloatArray
 
-PAPER = "paper3"
 # A rate taken for a temperature moves by less, and so does an oven that was not switched on.
 LEAST_SPAN = 1.0  # K
 

@@ -6,14 +6,10 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
 from testbed.audit.figures import allan_figure, drift_figure, gain_figure
 from testbed.audit.summary import summary
 from testbed.audit.table_2 import ORIGINAL, PIPELINE, TABLE_2
-from testbed.report.numbers import fixed, plain, significant
-from testbed.report.svg import svg_text
+from testbed.report.template import render
 from testbed.store import write_text
 from testbed.units import DEG_H
 
@@ -115,21 +111,15 @@ def _allan(qualities: dict[str, Quality]) -> str:
 
 
 def _page(audited: Audited, figures: dict[str, object]) -> str:
-    environment = Environment(
-        loader=PackageLoader("testbed.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
     record = audited.thermal.record
     drawn = {
         "drift": drift_figure(record, audited.compensated, audited.thermal.drift),
         "allan": allan_figure(curves(audited.audit)),
         "gain": gain_figure(audited.audit),
     }
-    return environment.get_template("audit.html.j2").render(
+    return render(
+        "audit.html.j2",
+        drawn,
         method=audited.method,
         record=audited.thermal.name,
         hours=record.rate.size / record.sample_rate_hz / 3600.0,
@@ -138,6 +128,4 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
         extrapolated=audited.extrapolated,
         trained_on=audited.trained_on,
         paper={name: TABLE_2[name] for name in (ORIGINAL, PIPELINE)},
-        # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
-        figures={name: Markup(svg_text(figure, name)) for name, figure in drawn.items()},
     )

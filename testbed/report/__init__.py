@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from typing import TYPE_CHECKING, Any
 
 from testbed.errors import Problem, ScenarioError
 from testbed.palette import series_colors
@@ -14,10 +11,12 @@ from testbed.report.budget import band_rows, budget_figure, line_error, line_opt
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
-from testbed.report.numbers import fixed, plain, significant
-from testbed.report.svg import svg_text
+from testbed.report.template import render
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
 from testbed.store import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 REPORT = "report.html"
 
@@ -56,16 +55,13 @@ def write_report(run_dir: Path) -> Path:
 
 
 def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
-    environment = Environment(
-        loader=PackageLoader("testbed.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
-    environment.globals |= {"ratios": RATIOS, "over_bound": over_bound, "honesty": honesty, "line_error": line_error}
-    return environment.get_template("report.html.j2").render(
+    return render(
+        "report.html.j2",
+        _figures(metrics, digest),
+        ratios=RATIOS,
+        over_bound=over_bound,
+        honesty=honesty,
+        line_error=line_error,
         metrics=metrics,
         names=_shown_metrics(metrics),
         line_sources=_line_sources(metrics),
@@ -76,7 +72,6 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         digest=digest,
         bands=band_rows(metrics.budget, digest) if metrics.budget else [],
         line_optima=line_optima(metrics),
-        figures=_figures(metrics, digest),
     )
 
 
@@ -100,7 +95,7 @@ def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
     }
 
 
-def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Markup]:
+def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
     colors = series_colors(list(metrics.sensors), list(metrics.fusion))
     drawn = {"rates": rates_figure(digest, colors)}
     if digest.filter_errors:
@@ -110,5 +105,4 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Markup]:
         drawn["thermal"] = thermal_figure(digest, colors)
     if metrics.budget is not None:
         drawn["budget"] = budget_figure(metrics.budget, colors)
-    # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
-    return {name: Markup(svg_text(figure, name)) for name, figure in drawn.items()}
+    return drawn

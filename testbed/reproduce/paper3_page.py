@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from testbed.audit.figures import SIZE_IN, allan_figure
 from testbed.audit.leak import DRIFT_PERIOD, LEAST_GAIN
 from testbed.palette import COMMANDED, FILTERS, SENSORS, TRUTH
-from testbed.report.numbers import significant
-from testbed.report.svg import STYLE, svg_text
+from testbed.report.svg import STYLE
+from testbed.report.template import render
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,21 +55,7 @@ def page(rows: Sequence[Mapping[str, Any]], audits: Mapping[str, Audit], folders
         "allan": allan_figure(qualities, {**styles, "oracle": (TRUTH, (0, (1.2, 1.6)))}),
         "gain": _gain_figure(audits, styles),
     }
-    environment = Environment(
-        loader=PackageLoader("testbed.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["significant"] = significant
-    return environment.get_template("paper3.html.j2").render(
-        rows=rows,
-        seeds=seeds,
-        folders=folders,
-        # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
-        figures={name: Markup(svg_text(figure, name)) for name, figure in drawn.items()},
-    )
+    return render("paper3.html.j2", drawn, rows=rows, seeds=seeds, folders=folders)
 
 
 def _gain_figure(audits: Mapping[str, Audit], styles: Mapping[str, tuple[object, object]]) -> Figure:
