@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from testbed.compensation import training
 from testbed.sensors.allan import allan_deviation, fit_allan
 from testbed.sensors.allan_fit import judge_fit
 
@@ -113,9 +114,7 @@ def block_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK)
     block : float, optional
         Length of a block [s].
     """
-    length = max(1, round(block * sample_rate_hz))
-    means: FloatArray = values[: values.size // length * length].reshape(-1, length).mean(axis=1)
-    return means
+    return training.block_means(values, max(1, round(block * sample_rate_hz)))
 
 
 def low_pass(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:
