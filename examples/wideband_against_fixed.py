@@ -188,9 +188,13 @@ MISMATCH_AT = {0.5: 2, 10.0: 10, 100.0: 13}
 
 
 def under_mismatch(seeds: Sequence[int]) -> None:
-    """Print what 5 % of belief error costs: promised are at most 1.3 sqrt(ideal^2 + forced^2)."""
+    """Print what 5 % of belief error costs: promised are at most 1.3 sqrt(ideal^2 + forced^2).
+
+    In one run noise and forced error may add as amplitudes, which gives a ratio of up to sqrt(2); over seeds their squares add. So the
+    ratio of the rms over the seeds stands beside the largest of a single run.
+    """
     print(
-        "belief off by 5 %            at Hz  ideal    forced   error    largest ratio   deg/s, medians; error / sqrt(ideal^2 + forced^2)"
+        "belief off by 5 %            at Hz  ideal    forced   error   over seeds  largest   deg/s, medians; ratio error / sqrt(ideal^2 + forced^2)"
     )
     for sensor in SENSORS:
         for change in ({"gain": 1.05}, {"gain": 0.95}, {"corner": 1.05}, {"corner": 0.95}):
@@ -199,9 +203,10 @@ def under_mismatch(seeds: Sequence[int]) -> None:
             for freq, decade in MISMATCH_AT.items():
                 error, ideal, forced = mismatch_ratios(freq, decade, wrong, seeds).T
                 worst = float(np.max(error / np.hypot(ideal, forced)))
+                together = float(np.sqrt(np.mean(error**2) / np.mean(ideal**2 + forced**2)))
                 print(
                     f"{sensor:>10} {key:>6} x {factor:4.2f}{freq:12.1f}{np.median(ideal):9.5f}{forced[0]:9.5f}"
-                    f"{np.median(error):9.5f}{worst:9.3f}   {'met' if worst <= 1.3 else 'MISSED'}",
+                    f"{np.median(error):9.5f}{together:9.3f}{worst:10.3f}   {'met' if worst <= 1.3 else 'MISSED in a run'}",
                     flush=True,
                 )
 
