@@ -1,9 +1,11 @@
-"""CEEMDAN of a day at 1 Hz (85,200 samples, 100 trials): time, memory, and how much faster than EMD-signal in its ten-sift mode.
+"""CEEMDAN of a day at 1 Hz (85,200 samples, 100 trials): time, memory, and how much faster than EMD-signal in its
+ten-sift mode.
 
-Promise: at most 15 s on two cores and 500 MB, at least 12 times faster than EMD-signal on the same cores. The peer takes shorter records (each
-with our time beside it) and is extrapolated by the straight line through the last two: its cost per call does not grow with the samples.
-That favours the peer a little, as a longer record has more modes. Where the cores are shared, believe the processor time.
-Run: python benchmarks/bench_ceemdan.py [samples of the peer's records, at least two ...]
+Promise: at most 15 s on two cores and 500 MB, at least 12 times faster than EMD-signal on the same cores. The peer
+takes shorter records (each with our time beside it) and is extrapolated by the straight line through the last two: its
+cost per call does not grow with the samples. That favours the peer a little, as a longer record has more modes. Where
+the cores are shared, believe the processor time. Run: python benchmarks/bench_ceemdan.py [samples of the peer's
+records, at least two ...]
 """
 
 from __future__ import annotations

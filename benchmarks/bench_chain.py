@@ -1,7 +1,8 @@
 """Where the time of a run goes: every stage outside MuJoCo against MuJoCo's own stepping, in one process.
 
-Promise: all stages outside MuJoCo of a 60 s mixed scenario with three filters and the recording take less time than MuJoCo's stepping.
-Prints CPU seconds per stage and the ratio. The first run warms the compiled code up and is not counted.
+Promise: all stages outside MuJoCo of a 60 s mixed scenario with three filters and the recording take less time than
+MuJoCo's stepping. Prints CPU seconds per stage and the ratio. The first run warms the compiled code up and is not
+counted.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from pathlib import Path
 
 import testbed
 from testbed.fusion import FILTERS
-from testbed.judge import Judge
+from testbed.judging.judge import Judge
 from testbed.models.motion import MotionProfile
-from testbed.models.turntable import Turntable
-from testbed.netcdf import NetcdfStore
+from testbed.models.turntable.turntable import Turntable
 from testbed.parts import resolve
 from testbed.recording import RecordingWriter
+from testbed.runs.netcdf import NetcdfStore
 from testbed.sensors.mems_gyro import MemsGyroStage
 from testbed.sensors.mhd_ars import MhdArsStage
 

@@ -1,7 +1,8 @@
-"""Covariance forms in single precision: smallest eigenvalue, condition number, difference from double precision; the root over an hour.
+"""Covariance forms in single precision: smallest eigenvalue, condition number, difference from double precision; the
+root over an hour.
 
-Belief `paper2` (seven states, modal realisation), P0 and R as shipped, both sensors at 20 kHz, and the nine states of order 3.
-Run: python benchmarks/bench_forms.py
+Belief `paper2` (seven states, modal realisation), P0 and R as shipped, both sensors at 20 kHz, and the nine states of
+order 3. Run: python benchmarks/bench_forms.py
 """
 
 import argparse
@@ -11,7 +12,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from testbed.fusion.belief import load_belief
-from testbed.fusion.kalman import Kalman, KalmanParameters
+from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.signals import FloatArray, random_stream
 
 RATES = {"mems_gyro": 20000.0, "mhd_ars": 20000.0}
@@ -52,7 +53,8 @@ def compare(label: str, n_time: int, **parameters: float) -> None:
     reference, covariances = run("joseph", "double", n_time, **parameters)
     truth = covariances[-1]
     print(
-        f"{label}: condition of P {np.linalg.cond(truth):.1e}, of its correlations {np.linalg.cond(scaled(truth, truth)):.1e}"
+        f"{label}: condition of P {np.linalg.cond(truth):.1e}, of its correlations "
+        f"{np.linalg.cond(scaled(truth, truth)):.1e}"
     )
     print(
         f"{'form':14s}{'precision':10s}{'lowest eigenvalue':>19s}{'of correlations':>17s}{'P off':>10s}{'rate off, deg/s':>17s}"

@@ -1,9 +1,11 @@
-"""Step cost of the filters: ours beside filterpy and equivalent C, five states, two sensors, 20 kHz and 2 kHz, one process.
+"""Step cost of the filters: ours beside filterpy and equivalent C, five states, two sensors, 20 kHz and 2 kHz, one
+process.
 
-Promised: at least 150 times faster than filterpy; within 1.5 times of C (gcc -O3 -march=native, sizes fixed); adaptive filters at most
-3 times the plain Kalman step; `wideband` 5 times faster than real time. C and filterpy do the recursion without what adapts: the plain
-filter; for `allan_srkf` filterpy's SquareRootKalmanFilter; for `wideband` sixteen times the filter of order 3 (seven states).
-`steady_state` is held against the plain filter too: it saves the covariance. Run: python benchmarks/bench_kalman.py
+Promised: at least 150 times faster than filterpy; within 1.5 times of C (gcc -O3 -march=native, sizes fixed); adaptive
+filters at most 3 times the plain Kalman step; `wideband` 5 times faster than real time. C and filterpy do the recursion
+without what adapts: the plain filter; for `allan_srkf` filterpy's SquareRootKalmanFilter; for `wideband` sixteen times
+the filter of order 3 (seven states). `steady_state` is held against the plain filter too: it saves the covariance. Run:
+python benchmarks/bench_kalman.py
 """
 
 import argparse
@@ -19,7 +21,7 @@ import numpy as np
 
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import default_belief
-from testbed.fusion.kernels import kalman_kernel
+from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model import FusionModel, build_model
 from testbed.parts import resolve
 from testbed.signals import FloatArray, random_stream
@@ -131,7 +133,8 @@ def main() -> None:
     print(f"ours (kernel) {ours_us:.3f} us/step, {ours_us / plain_c:.2f} of C (promised: at most 1.5)", end="")
     print(f", filterpy {peer / ours_us:.0f} times ours (promised: at least 150)")
     print(
-        f"{'filter, with blocks':20s} {'us/step':>9}{'C':>8}{'filterpy':>10}{'/ kalman':>10}{'real time':>11}   promised"
+        f"{'filter, with blocks':20s} {'us/step':>9}{'C':>8}{'filterpy':>10}{'/ kalman':>10}{'real time':>11}   "
+        f"promised"
     )
     blocks = {"mems_gyro": Z[0, ::10].copy(), "mhd_ars": Z[1].copy()}
     plain_us = 0.0

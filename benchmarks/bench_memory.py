@@ -1,6 +1,7 @@
 """Memory of `testbed run` against duration: peak resident set of whole processes.
 
-Promise: a 10 min run needs no more than a 1 min run plus 20 %. Give durations in seconds as arguments; mode `fixed` unless `servo` is among them.
+Promise: a 10 min run needs no more than a 1 min run plus 20 %. Give durations in seconds as arguments; mode `fixed`
+unless `servo` is among them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PROGRAM = (
-    "import resource, sys\nfrom testbed.cli import main\nsys.argv = ['testbed', 'run', sys.argv[1], '--out', sys.argv[2]]\n"
+    "import resource, sys\nfrom testbed.cli.app import main\nsys.argv = ['testbed', 'run', sys.argv[1], '--out', sys.argv[2]]\n"
     "try:\n    main()\nfinally:\n    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)\n"
 )
 

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
-from testbed.models.chebyshev import even_operators
-from testbed.models.mhd_channel import MhdChannel
+from testbed.models.mhd_channel.channel import MhdChannel
+from testbed.models.mhd_channel.chebyshev import even_operators
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import allantools
 import numpy as np
 
-from testbed.sensors.allan import allan_deviation, fit_allan
+from testbed.allan import allan_deviation, fit_allan
 from testbed.sensors.noise import GyroNoise
 from testbed.sensors.noise_terms import _one_over_f, bank_response
 

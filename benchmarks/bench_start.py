@@ -1,6 +1,7 @@
 """Start-up: a 1 s scenario, the second time, against the import of the libraries that it needs; and `testbed --help`.
 
-Promise: at most twice what importing its libraries takes; `--help` imports no heavy library. Whole processes, taken in turn, medians.
+Promise: at most twice what importing its libraries takes; `--help` imports no heavy library. Whole processes, taken in
+turn, medians.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Integration steps of several holds: `python benchmarks/bench_step.py`.
 
 For each motion and number of holds: largest change of the true rate against the base step of 50 us and against 3.125 us
-(the same held references), over the largest rate, and the CPU time of the truth against that of the base step. Beside it,
-the same with the plain mean of the held references, which is what the correction is for. Last, what `auto` takes for
-every shipped scenario.
+(the same held references), over the largest rate, and the CPU time of the truth against that of the base step. Beside
+it, the same with the plain mean of the held references, which is what the correction is for. Last, what `auto` takes
+for every shipped scenario.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from unittest.mock import patch
 
 import numpy as np
 
-from testbed.loader import load_scenario
-from testbed.models import stepping
 from testbed.models.motion import MotionProfile
-from testbed.models.turntable import Mounting, Turntable, TurntableParameters
-from testbed.step_choice import choose_step
+from testbed.models.turntable import stepping
+from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.scenario.loader import load_scenario
+from testbed.scenario.step_choice import choose_step
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -62,7 +62,8 @@ def main() -> None:
         choice = choose_step(replace(scenario, turntable=parameters))
         error = "" if choice.error is None else f", error {choice.error:.1e}"
         print(
-            f"{path.stem}: auto takes {1e6 * choice.step:g} us{error}; to find it took {time.process_time() - begin:.2f} s"
+            f"{path.stem}: auto takes {1e6 * choice.step:g} us{error}; to find it took "
+            f"{time.process_time() - begin:.2f} s"
         )
 
 

@@ -15,8 +15,8 @@ import mujoco.rollout
 import numpy as np
 
 from testbed.models.motion import CommandBlock, MotionProfile
-from testbed.models.table_modes import coupled_modes
-from testbed.models.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.modes import coupled_modes
+from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable

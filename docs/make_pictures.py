@@ -8,7 +8,7 @@ from pathlib import Path
 
 import matplotlib.image
 
-from testbed.viewer import RECORDING, screenshot
+from testbed.recording.viewer import RECORDING, screenshot
 
 PICTURE = Path(__file__).parent / "images" / "recording.png"
 MENU = 36  # points; the viewer's own menu bar says nothing about the run

@@ -1,8 +1,10 @@
-"""What each part of paper 1's adaptive filter does, and which one breaks it: every table of docs/ablation.md from one command.
+"""What each part of paper 1's adaptive filter does, and which one breaks it: every table of docs/ablation.md from one
+command.
 
-Simulated `sx300` and `adis16505_filtered` with all their noise; belief `eq39` unless said; errors in deg/s, phase included, medians over seeds
-1, 2, ... The four signals of Table II are the truth of the simulated table, 20 s, judged from 10 s on; the signals beyond them are ideal
-sines over the same times, the jump (0.5 Hz to 10 Hz at 10 s) judged from 15 s on. Tuning uses seeds from 101 on, and 0.5 Hz only.
+Simulated `sx300` and `adis16505_filtered` with all their noise; belief `eq39` unless said; errors in deg/s, phase
+included, medians over seeds 1, 2, ... The four signals of Table II are the truth of the simulated table, 20 s, judged
+from 10 s on; the signals beyond them are ideal sines over the same times, the jump (0.5 Hz to 10 Hz at 10 s) judged
+from 15 s on. Tuning uses seeds from 101 on, and 0.5 Hz only.
 
 Run it with ``python examples/ablation.py [--seeds N]`` (default 3: about a minute and a half of processor time).
 """
@@ -30,7 +32,8 @@ BEYOND = ("25 Hz", "100 Hz", "0.5 Hz, 5 deg/s", "4 Hz, 10 deg/s", "jump")
 SHAKF_Q, ARW_Q, LITERAL_Q = (f"{q} (deg/s)^2/s" for q in ("0.0056", "0.1", "0.3"))
 LITERAL = {"q": SHAKF_Q}
 BARE = LITERAL | {"bands": {}, "alpha": 0.0}
-# MHD bands far below H P H', so that R stays the smaller part of the innovation's variance and S has nothing to inflate.
+# MHD bands far below H P H', so that R stays the smaller part of the innovation's variance and S has nothing to
+# inflate.
 LOW_BANDS = load_bands("sx300_adis16505")
 LOW_BANDS["mhd_ars"] = LOW_BANDS["mhd_ars"].model_copy(update={"R": tuple(R * DEG**2 for R in (6.5e-7, 3e-9, 3e-10))})
 # What the table calls it: filter, its parameters.
@@ -108,7 +111,9 @@ def objective_at_half_a_hertz(rate: np.ndarray, seeds: Sequence[int] = TUNING_SE
 
 
 def tune_q(objective: Callable[..., float]) -> tuple[float, float, int]:
-    """Return the q [(deg/s)^2/s] that Brent's bounded search in log10 q finds between 1e-4 and 1, its error [deg/s], and the runs it took."""
+    """Return the q [(deg/s)^2/s] that Brent's bounded search in log10 q finds between 1e-4 and 1, its error [deg/s],
+    and the runs it took.
+    """
     best = minimize_scalar(
         lambda p: objective(q=10.0**p * DEG**2), bounds=(-4.0, 0.0), method="bounded", options={"xatol": 0.02}
     )
@@ -116,7 +121,9 @@ def tune_q(objective: Callable[..., float]) -> tuple[float, float, int]:
 
 
 def tune_R(objective: Callable[..., float], **own: Any) -> tuple[dict[str, float], float, int]:
-    """Return the R0 of both sensors [rad^2/s^2] that Nelder and Mead find in log10 R from the default, its error [deg/s], and the runs."""
+    """Return the R0 of both sensors [rad^2/s^2] that Nelder and Mead find in log10 R from the default, its error
+    [deg/s], and the runs.
+    """
 
     def sensors(p: np.ndarray) -> dict[str, float]:
         return dict(zip(("mems_gyro", "mhd_ars"), 10.0**p * DEG**2, strict=True))

@@ -1,8 +1,8 @@
 """What practitioners would pick, beside the adaptive filters and the optimum: the table of docs/baselines.md.
 
-The four signals of paper 1 (20 s, the last 10 s judged, phase included), `sx300` and `adis16505_filtered` with all their noise, 1/f and bias
-instability included, belief `identified`, every filter with its defaults; `steady_state` also made for the signal's strongest line. The ratio is
-to the optimum of that signal, which counts white noise only.
+The four signals of paper 1 (20 s, the last 10 s judged, phase included), `sx300` and `adis16505_filtered` with all
+their noise, 1/f and bias instability included, belief `identified`, every filter with its defaults; `steady_state` also
+made for the signal's strongest line. The ratio is to the optimum of that signal, which counts white noise only.
 
 Run it with ``python examples/baselines.py [SEEDS]`` (default 3; about 2 min of processor time).
 """
@@ -13,9 +13,9 @@ import sys
 
 import numpy as np
 
-from testbed.budget import signal_optimum
 from testbed.fusion import FILTERS, estimate
 from testbed.fusion.belief import load_belief
+from testbed.judging.budget import signal_optimum
 from testbed.models.motion import MotionProfile
 from testbed.parts import resolve
 from testbed.reproduce.paper1 import SIGNALS
@@ -73,7 +73,8 @@ def main() -> None:
         lines = lines_of(signal)
         best, coloured = (signal_optimum(SENSORS, RATES, lines, coloured=coloured) for coloured in (False, True))
         print(
-            f"{signal:>8}{'optimum':>22}{best.rmse / DEG:10.5f}{'':>21}   {coloured.rmse / DEG:.5f} once 1/f noise has built up"
+            f"{signal:>8}{'optimum':>22}{best.rmse / DEG:10.5f}{'':>21}   {coloured.rmse / DEG:.5f} once 1/f noise "
+            f"has built up"
         )
         runs = [errors(signal, seed) for seed in seeds]
         for name in runs[0]:

@@ -1,12 +1,14 @@
-"""Calibrate the limits of N_k on a sweep of the simulated sensors, as Figure 7 of paper 1: the shipped bands `sx300_adis16505` come from here.
+"""Calibrate the limits of N_k on a sweep of the simulated sensors, as Figure 7 of paper 1: the shipped bands
+`sx300_adis16505` come from here.
 
-A stepped sine of 1 deg/s over 0.1-25 Hz, at frequencies that none of the judged signals uses (0.5, 4, 10 Hz are left out), through the
-presets `sx300` and `adis16505_filtered`; N_k / dT of each step is the mean half squared increment of the readings once they have settled.
-The band edges are where physics puts them: 2 Hz, about the corner of the MHD ARS, and 6.3 Hz, beyond the 4.5 Hz low-pass of the gyro.
-The R of each band and the waits are choices, not measurements; the file says which.
+A stepped sine of 1 deg/s over 0.1-25 Hz, at frequencies that none of the judged signals uses (0.5, 4, 10 Hz are left
+out), through the presets `sx300` and `adis16505_filtered`; N_k / dT of each step is the mean half squared increment of
+the readings once they have settled. The band edges are where physics puts them: 2 Hz, about the corner of the MHD ARS,
+and 6.3 Hz, beyond the 4.5 Hz low-pass of the gyro. The R of each band and the waits are choices, not measurements; the
+file says which.
 
-Run it with ``python examples/calibrate_bands.py`` for the sweep, and with ``--file`` for the file of bands. For your own sensors change PRESETS,
-EDGES_HZ and CHOICES, and name the bands under `bands:` of the filter.
+Run it with ``python examples/calibrate_bands.py`` for the sweep, and with ``--file`` for the file of bands. For your
+own sensors change PRESETS, EDGES_HZ and CHOICES, and name the bands under `bands:` of the filter.
 """
 
 from __future__ import annotations
@@ -61,7 +63,10 @@ def bands_file(levels: dict[str, np.ndarray]) -> str:
     """Return the text of the file of bands: two digits, as the scatter of N_k allows."""
     lines = [
         "# Written by examples/calibrate_bands.py: N_k / dT at the band edges of a stepped sine of 1 deg/s,",
-        f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and {EDGES_HZ[1]:g} Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:",
+        (
+            f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and {EDGES_HZ[1]:g} "
+            f"Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:"
+        ),
         "# the limits hold for that amplitude only.",
     ]
     square = np.deg2rad(1.0) ** 2

@@ -1,7 +1,8 @@
 """Design a channel: lower corner, scale factor and Hartmann number against field and height.
 
 Prints a table and draws the three over the field, one line per height. For example:
-`python examples/design_channel.py --fluid mercury --closure axial_field --field 0.1 0.3 0.5 --height 2 4 8 --width 6 --radius 15`
+`python examples/design_channel.py --fluid mercury --closure axial_field --field 0.1 0.3 0.5 --height 2 4 8 --width 6
+--radius 15`
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.models.channel_ring import ChannelRing
-from testbed.models.fluids import FLUIDS
-from testbed.models.mhd_channel import MhdChannel
+from testbed.models.mhd_channel.channel import MhdChannel
+from testbed.models.mhd_channel.fluids import FLUIDS
+from testbed.models.mhd_channel.ring import ChannelRing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,10 @@ if TYPE_CHECKING:
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "design_channel.png"
 CLOSURES = ("local", "radial_field", "axial_field")
 TEMPERATURE = 293.15  # K
-HEADER = f"{'B [T]':>7} {'l [mm]':>7} {'corner [Hz]':>12} {'EMF [uV/(rad/s)]':>17} {'Ha [-]':>8} {'Johnson [nrad/s/sqrt(Hz)]':>26}"
+HEADER = (
+    f"{'B [T]':>7} {'l [mm]':>7} {'corner [Hz]':>12} {'EMF [uV/(rad/s)]':>17} {'Ha [-]':>8} "
+    f"{'Johnson [nrad/s/sqrt(Hz)]':>26}"
+)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
-"""Drift compensation of a fibre-optic gyro on thermal cycles that its model has not seen: the figures of docs/compensation_models.md.
+"""Drift compensation of a fibre-optic gyro on thermal cycles that its model has not seen: the figures of
+docs/compensation_models.md.
 
-Simulated `fog_paper3` at 1 Hz on a fixed base, Earth rate 10.6 deg/h. Trained on the paper's programme, on it and its mirror image, or on
-programmes of our own; judged on four others: the paper's two and two with other rates, holds and turning points, all under new noise.
-Then the same where the instrument's lags and hysteresis are not those that the features have.
+Simulated `fog_paper3` at 1 Hz on a fixed base, Earth rate 10.6 deg/h. Trained on the paper's programme, on it and its
+mirror image, or on programmes of our own; judged on four others: the paper's two and two with other rates, holds and
+turning points, all under new noise. Then the same where the instrument's lags and hysteresis are not those that the
+features have.
 
 Run it with ``OMP_NUM_THREADS=1 python examples/fog_compensators.py [SEEDS]`` (default 6).
 """
@@ -16,16 +18,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.audit.leak import audit
+from testbed.allan import allan_deviation, fit_allan
 from testbed.compensation.features import Features
 from testbed.compensation.lssvm import Lssvm, block_residuals
 from testbed.compensation.model_only import DriftModel, train
 from testbed.compensation.record import Record
 from testbed.compensation.search import evolve, grey_wolf
 from testbed.compensation.training import block_means, gather
+from testbed.drift.leak import audit
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
-from testbed.sensors.allan import allan_deviation, fit_allan
 from testbed.sensors.base import Surroundings
 
 if TYPE_CHECKING:
@@ -62,8 +64,8 @@ MODELS: dict[str, tuple[str, Features | None, tuple[str, ...]]] = {
     "lssvm": ("lssvm", None, PAPER),
     "lssvm, T alone": ("lssvm", Features(degree=1, slopes=False, lags=()), PAPER[1:]),
 }
-# Lags of coil, spool and core [s], half widths [K], lag of the thermometer [s], factor on hysteresis and gradient. The features have
-# lags of 900, 1500 and 2400 s, which are those of the preset, and plays of 3 and 10 K.
+# Lags of coil, spool and core [s], half widths [K], lag of the thermometer [s], factor on hysteresis and gradient. The
+# features have lags of 900, 1500 and 2400 s, which are those of the preset, and plays of 3 and 10 K.
 TRUTHS = {
     "as the features": ((900.0, 1500.0, 2400.0), (4.0, 12.0), 900.0, 1.0),
     "spread wider": ((700.0, 1300.0, 3000.0), (3.0, 8.0), 700.0, 1.0),
@@ -159,7 +161,9 @@ def compare(seeds: range) -> None:
 
 
 def other_truths(seeds: range) -> None:
-    """Print what it costs that an instrument has other lags than the features, and what a record without noise would give."""
+    """Print what it costs that an instrument has other lags than the features, and what a record without noise would
+    give.
+    """
     head("instrument, method")
     for truth in TRUTHS:
         data = [cycles(seed, other(truth)) for seed in seeds]

@@ -1,4 +1,5 @@
-"""N_k beside an indicator that does not see amplitude: a table of signals where N_k fails, and a figure over frequency and amplitude.
+"""N_k beside an indicator that does not see amplitude: a table of signals where N_k fails, and a figure over frequency
+and amplitude.
 
 Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, 6 s, medians of the second half.
 Run: ``python examples/frequency_indicator.py [FIGURE.png]`` (about 20 s)
@@ -14,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from testbed.fusion.arw_shakf import increment_variance
+from testbed.fusion.analysis.indicator import FrequencyIndicator
 from testbed.fusion.belief import load_belief
-from testbed.fusion.indicator import FrequencyIndicator
+from testbed.fusion.filters.arw_shakf import increment_variance
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:
@@ -59,7 +60,9 @@ def indicators(lines: list[tuple[float, float]], duration: float = 6.0) -> dict[
 
 
 def draw() -> Figure:
-    """Return the figure: N_k of both sensors above, the indicators below, over the frequency of a sine of three amplitudes."""
+    """Return the figure: N_k of both sensors above, the indicators below, over the frequency of a sine of three
+    amplitudes.
+    """
     figure = Figure(figsize=(9.0, 6.4), dpi=160, layout="constrained")
     (gyro, mhd), (one, both) = figure.subplots(2, 2, sharex=True, sharey="row")
     for amplitude, color in AMPLITUDES.items():

@@ -1,7 +1,9 @@
-"""Identify what the filters may believe about the presets `sx300` and `adis16505_filtered`: the shipped belief `identified` comes from here.
+"""Identify what the filters may believe about the presets `sx300` and `adis16505_filtered`: the shipped belief
+`identified` comes from here.
 
-Each response is sampled at 301 frequencies, 0.01 Hz to 1 kHz, evenly in logarithm, and fitted with relative weight; noise is the data sheets'.
-Four real poles carry the Stokes layer of the MHD channel to 2e-4; equation (39), with two, is wrong by 0.2 %.
+Each response is sampled at 301 frequencies, 0.01 Hz to 1 kHz, evenly in logarithm, and fitted with relative weight;
+noise is the data sheets'. Four real poles carry the Stokes layer of the MHD channel to 2e-4; equation (39), with two,
+is wrong by 0.2 %.
 
 Run it with ``python examples/identify_beliefs.py``; it prints the belief file.
 """
@@ -10,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from testbed.fusion.identify import Identified, identify
+from testbed.fusion.analysis.identify import Identified, identify
 from testbed.sensors import load_preset
 
 FREQ_HZ = np.logspace(-2.0, 3.0, 301)
@@ -45,7 +47,8 @@ def belief_file() -> str:
     ]
     for name, fit in identified().items():
         lines.append(
-            f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to {FREQ_HZ[-1]:g} Hz"
+            f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to "
+            f"{FREQ_HZ[-1]:g} Hz"
         )
         # Nine digits: far below the misfit.
         lines += [

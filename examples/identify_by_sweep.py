@@ -1,8 +1,9 @@
 """Identify the sensors as paper 1 does, from a stepped-sine sweep in time: the shipped belief `swept` comes from here.
 
-The simulated `sx300` (20 kHz) and `adis16505_filtered` (2 kHz) are shaken at 1 deg/s, one frequency after the other, with all their noise on.
-Gain and phase of each step are fitted over whole periods; then equation (39)'s forms are fitted to the steps with relative weight:
-(b1 s + b0)/(a2 s^2 + a1 s + a0) for the gyro, b1 s/(a2 s^2 + a1 s + a0) for the MHD sensor. The judged frequencies 0.5, 4, 10 Hz are left out.
+The simulated `sx300` (20 kHz) and `adis16505_filtered` (2 kHz) are shaken at 1 deg/s, one frequency after the other,
+with all their noise on. Gain and phase of each step are fitted over whole periods; then equation (39)'s forms are
+fitted to the steps with relative weight: (b1 s + b0)/(a2 s^2 + a1 s + a0) for the gyro, b1 s/(a2 s^2 + a1 s + a0) for
+the MHD sensor. The judged frequencies 0.5, 4, 10 Hz are left out.
 
 Run it with ``python examples/identify_by_sweep.py [SEED]``; it prints the belief file (a few seconds).
 """
@@ -13,7 +14,7 @@ import sys
 
 import numpy as np
 
-from testbed.fusion.identify import Identified, identify, sine_response
+from testbed.fusion.analysis.identify import Identified, identify, sine_response
 from testbed.sensors import load_preset
 
 BASE_HZ = 20_000.0
@@ -45,7 +46,8 @@ FREQ_HZ = np.array(
         800.0,
     ]
 )
-# The gyro's slow mode (time constant 9.6 s, 4 % of the gain) must have gone where it is to be measured; above, the fit of a drift takes it up.
+# The gyro's slow mode (time constant 9.6 s, 4 % of the gain) must have gone where it is to be measured; above, the fit
+# of a drift takes it up.
 SLOW_HZ, SETTLE_SLOW_S, SETTLE_S, LEAST_S = 0.5, 60.0, 10.0, 10.0
 SENSORS = {
     "mems_gyro": ("adis16505_filtered", {"real_poles": 2}),
@@ -91,7 +93,10 @@ def identified(seed: int = SEED) -> dict[str, Identified]:
 def belief_file(seed: int = SEED) -> str:
     """Return the text of the belief file."""
     lines = [
-        "# Written by examples/identify_by_sweep.py from a stepped sine of 1 deg/s with noise on; equation (39)'s forms, s in rad/s, highest first."
+        (
+            "# Written by examples/identify_by_sweep.py from a stepped sine of 1 deg/s with noise on; equation (39)'s "
+            "forms, s in rad/s, highest first."
+        )
     ]
     for name, fit in identified(seed).items():
         lines.append(

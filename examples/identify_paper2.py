@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from testbed.fusion.identify import Identified, identify
+from testbed.fusion.analysis.identify import Identified, identify
 from testbed.sensors import load_preset
 
 

@@ -1,8 +1,9 @@
-"""What of a decomposition can be relied on: single modes change with the seed of the added noise, groups of modes hardly do.
+"""What of a decomposition can be relied on: single modes change with the seed of the added noise, groups of modes
+hardly do.
 
-A day at 1 Hz: white and flicker noise with the drift of one thermal cycle. Prints entropies and periods of the modes, then for each way to
-group them the cuts by seed and how far the sum of a group moves from seed to seed, over its own size; the same for single modes.
-Run: python examples/mode_groups.py [trials]
+A day at 1 Hz: white and flicker noise with the drift of one thermal cycle. Prints entropies and periods of the modes,
+then for each way to group them the cuts by seed and how far the sum of a group moves from seed to seed, over its own
+size; the same for single modes. Run: python examples/mode_groups.py [trials]
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ METHODS = ("period", "sample_entropy", "permutation_entropy")
 
 
 def record(n_time: int = 85_200) -> FloatArray:
-    """Return noise of 7.8e-4 deg/sqrt(h) and 1.5e-2 deg/h with the drift of a cycle 20, 60, -30 C with a lag of 25 min [rad/s]."""
+    """Return noise of 7.8e-4 deg/sqrt(h) and 1.5e-2 deg/h with the drift of a cycle 20, 60, -30 C with a lag of 25 min
+    [rad/s].
+    """
     noise = GyroNoise(angle_random_walk=7.8e-4 * 60.0 * DEG_PER_HOUR, bias_instability=1.5e-2 * DEG_PER_HOUR).sample(
         n_time, 1.0, 1
     )
@@ -58,7 +61,10 @@ def main(trials: int = 20) -> None:
     for method in METHODS:
         groups = [group_modes(modes, 1.0, method=method) for modes in runs]
         print(
-            f"{method}: noise ends at {[g.noise.stop for g in groups]}, mixed at {[g.mixed.stop for g in groups]}; moves by",
+            (
+                f"{method}: noise ends at {[g.noise.stop for g in groups]}, mixed at {[g.mixed.stop for g in groups]}; "
+                f"moves by"
+            ),
             end="",
         )
         for name in ("noise", "mixed", "drift"):

@@ -1,7 +1,8 @@
-"""Figure 2 of Su et al. 2024: how far a mercury channel's reading is off, by the paper's one mode and by its full equation.
+"""Figure 2 of Su et al. 2024: how far a mercury channel's reading is off, by the paper's one mode and by its full
+equation.
 
-Above, the error of the reading against the wall's rate for the paper's two fields; below, what the one-mode form (4) itself
-gets wrong. Run: `python examples/one_mode_error.py [FIGURE.png]`
+Above, the error of the reading against the wall's rate for the paper's two fields; below, what the one-mode form (4)
+itself gets wrong. Run: `python examples/one_mode_error.py [FIGURE.png]`
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from testbed.models.mhd_channel import MhdChannel, one_mode_response
+from testbed.models.mhd_channel.channel import MhdChannel, one_mode_response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

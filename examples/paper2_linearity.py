@@ -1,7 +1,8 @@
 """Linearity of paper 2 at one frequency: the deviation of the fused rate over the MHD ARS's own, by how it is measured.
 
-The sensors are linear, so the deviation from the fitted line is noise. The first row is a filter just switched on, the second one that has
-run for 300 s but is read for one second (two periods, no window), the third the protocol of `testbed reproduce paper2`.
+The sensors are linear, so the deviation from the fitted line is noise. The first row is a filter just switched on, the
+second one that has run for 300 s but is read for one second (two periods, no window), the third the protocol of
+`testbed reproduce paper2`.
 
 Run: ``python examples/paper2_linearity.py [--seeds N]`` (a quarter of a minute of processor time per seed)
 """
@@ -43,7 +44,8 @@ def main() -> None:
         found = ratios(seeds, protocol)
         error = np.std(found, ddof=min(1, seeds - 1)) / np.sqrt(seeds)
         print(
-            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, below 1 in {np.sum(found < 1.0)}"
+            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, below 1 in "
+            f"{np.sum(found < 1.0)}"
         )
 
 

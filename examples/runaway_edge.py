@@ -1,9 +1,11 @@
 """Where `shakf` begins to work: the law q_crit = (T/2) sum A^2 w^(2m) against the edge found by trying.
 
-Single lines through the simulated `sx300` and `adis16505_filtered` with all their noise, belief `eq39`, `shakf` of order m. The edge is
-bisected in log q between a sixth and six times q_crit, to 3 %; a run fails if the error over the second half is above a tenth of the signal.
+Single lines through the simulated `sx300` and `adis16505_filtered` with all their noise, belief `eq39`, `shakf` of
+order m. The edge is bisected in log q between a sixth and six times q_crit, to 3 %; a run fails if the error over the
+second half is above a tenth of the signal.
 
-Run it with ``python examples/runaway_edge.py`` (about 20 s): it prints the table and writes docs/images/runaway_edge.png and .csv.
+Run it with ``python examples/runaway_edge.py`` (about 20 s): it prints the table and writes
+docs/images/runaway_edge.png and .csv.
 """
 
 from __future__ import annotations
@@ -17,9 +19,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from testbed.fusion import estimate
-from testbed.fusion.runaway import critical_q
+from testbed.fusion.analysis.runaway import critical_q
+from testbed.runs.folder import write_text
 from testbed.sensors import load_preset
-from testbed.store import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -147,7 +149,8 @@ def main() -> None:
     draw(edges).savefig(PICTURE)
     ratios = [e.ratio for e in edges]
     print(
-        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; drawn in {PICTURE.name}"
+        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; drawn in "
+        f"{PICTURE.name}"
     )
 
 

@@ -1,13 +1,16 @@
 """`wideband` against the best fixed filter of every signal, and under a wrong belief: the figures of docs/wideband.md.
 
-Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, phase included, the second half judged. Of 20 s (the default)
-the slow error, the same in all filters, is the larger part; ``--duration 10`` shows more of what sets the filters apart. The fixed filters are
-`kalman` of order 3 on a decade grid of q, on the same readings; the grid is followed until the best one has a worse one on either side.
-The wheel is that of scenarios/satellite_microvibration.yaml: alone, through a run-up from 20 to 60 rev/s, and on the vibration of its platform.
+Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, phase included, the second half
+judged. Of 20 s (the default) the slow error, the same in all filters, is the larger part; ``--duration 10`` shows more
+of what sets the filters apart. The fixed filters are `kalman` of order 3 on a decade grid of q, on the same readings;
+the grid is followed until the best one has a worse one on either side. The wheel is that of
+scenarios/satellite_microvibration.yaml: alone, through a run-up from 20 to 60 rev/s, and on the vibration of its
+platform.
 
-Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about 40 s of processor time
-for each signal with ten seeds of 20 s. ``--mismatch`` prints the table of wrong beliefs instead, ``--change`` the one of changing signals.
-``--filters`` and ``--restart`` give `wideband` other parameters than its own in the first and the last, to see what they are for.
+Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about 40
+s of processor time for each signal with ten seeds of 20 s. ``--mismatch`` prints the table of wrong beliefs instead,
+``--change`` the one of changing signals. ``--filters`` and ``--restart`` give `wideband` other parameters than its own
+in the first and the last, to see what they are for.
 """
 
 from __future__ import annotations
@@ -138,7 +141,8 @@ def against_fixed(
 ) -> None:
     """Print a line per signal, and write them to a file."""
     print(
-        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, {duration:g} s"
+        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, "
+        f"{duration:g} s"
     )
     rows = []
     for label in labels:
@@ -171,8 +175,9 @@ def mismatch_ratios(
 ) -> FloatArray:
     """Return error, ideal and forced error [deg/s] of a sine of 1 deg/s for each seed, shape (n_seed, 3).
 
-    Ideal is `wideband` with the right belief on the same readings. Forced is what the wrong belief alone does: the fixed filter that is
-    best for this signal with the right belief (its `decade` of q), given the wrong one and readings without noise.
+    Ideal is `wideband` with the right belief on the same readings. Forced is what the wrong belief alone does: the
+    fixed filter that is best for this signal with the right belief (its `decade` of q), given the wrong one and
+    readings without noise.
     """
     rate = truth([sine(freq)], duration)
     forced = fixed(readings(rate, 0, noise=False), rate, decade, wrong)
@@ -190,11 +195,12 @@ MISMATCH_AT = {0.5: 2, 10.0: 10, 100.0: 13}
 def under_mismatch(seeds: Sequence[int]) -> None:
     """Print what 5 % of belief error costs: promised are at most 1.3 sqrt(ideal^2 + forced^2).
 
-    In one run noise and forced error may add as amplitudes, which gives a ratio of up to sqrt(2); over seeds their squares add. So the
-    ratio of the rms over the seeds stands beside the largest of a single run.
+    In one run noise and forced error may add as amplitudes, which gives a ratio of up to sqrt(2); over seeds their
+    squares add. So the ratio of the rms over the seeds stands beside the largest of a single run.
     """
     print(
-        "belief off by 5 %            at Hz  ideal    forced   error   over seeds  largest   deg/s, medians; ratio error / sqrt(ideal^2 + forced^2)"
+        "belief off by 5 %            at Hz  ideal    forced   error   over seeds  largest   deg/s, medians; ratio "
+        "error / sqrt(ideal^2 + forced^2)"
     )
     for sensor in SENSORS:
         for change in ({"gain": 1.05}, {"gain": 0.95}, {"corner": 1.05}, {"corner": 0.95}):
@@ -205,8 +211,10 @@ def under_mismatch(seeds: Sequence[int]) -> None:
                 worst = float(np.max(error / np.hypot(ideal, forced)))
                 together = float(np.sqrt(np.mean(error**2) / np.mean(ideal**2 + forced**2)))
                 print(
-                    f"{sensor:>10} {key:>6} x {factor:4.2f}{freq:12.1f}{np.median(ideal):9.5f}{forced[0]:9.5f}"
-                    f"{np.median(error):9.5f}{together:9.3f}{worst:10.3f}   {'met' if worst <= 1.3 else 'MISSED in a run'}",
+                    f"{sensor:>10} {key:>6} x {factor:4.2f}{freq:12.1f}{np.median(ideal):9.5f}{forced[0]:9.5f}"(
+                        f"{np.median(error):9.5f}{together:9.3f}{worst:10.3f}   "
+                        f"{'met' if worst <= 1.3 else 'MISSED in a run'}"
+                    ),
                     flush=True,
                 )
 
@@ -225,7 +233,9 @@ AFTER = 0.1  # s; two memories of the filter
 
 
 def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -> tuple[float, float, float]:
-    """Return the errors [deg/s] from `AFTER` on, without a change (the second signal from the start, same noise), and the largest error."""
+    """Return the errors [deg/s] from `AFTER` on, without a change (the second signal from the start, same noise), and
+    the largest error.
+    """
     before, after = (truth([sine(*line)], duration) for line in CHANGES[label])
     half, rest = before.size // 2, before.size // 2 + round(AFTER * RATES["mhd_ars"])
     rate = np.concatenate([before[:half], after[half:]])
@@ -240,7 +250,8 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
 def under_change(seeds: Sequence[int], own: dict[str, float]) -> None:
     """Print what a change in the middle of the run costs: promised are at most 1.3 times the error without it."""
     print(
-        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after the change on"
+        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after "
+        f"the change on"
     )
     for label in CHANGES:
         real, ideal, peak = np.array([change_errors(label, seed, **own) for seed in seeds]).T

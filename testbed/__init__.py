@@ -1,10 +1,12 @@
 """Physics testbed for wide-band angular-rate sensing.
 
-Data flows one way: scenario -> commanded motion -> turntable (truth) -> sensors (readings) -> fusion (estimates) -> results.
+Data flows one way: scenario -> commanded motion -> turntable (truth) -> sensors (readings) -> fusion (estimates) ->
+results.
 
-Conventions: SI floats inside (rate [rad/s], angle [rad], frequency [Hz], time [s]); noise densities are two-sided root densities
-[rad/sqrt(s)], so that white noise sampled at interval T has the standard deviation N/sqrt(T); units live in YAML files, tables and plots only.
-Truth is the inertial rate at a sensor's site, never the encoder; the filters know readings and their own belief, never the truth.
+Conventions: SI floats inside (rate [rad/s], angle [rad], frequency [Hz], time [s]); noise densities are two-sided root
+densities [rad/sqrt(s)], so that white noise sampled at interval T has the standard deviation N/sqrt(T); units live in
+YAML files, tables and plots only. Truth is the inertial rate at a sensor's site, never the encoder; the filters know
+readings and their own belief, never the truth.
 """
 
 from __future__ import annotations
@@ -12,16 +14,16 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from testbed._version import __version__
 from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
-    from testbed.loader import load_scenario
-    from testbed.results import Run
-    from testbed.runner import run
-    from testbed.scenario import Scenario
-    from testbed.store import open_run
+    from testbed.chain.runner import run
+    from testbed.runs.folder import open_run
+    from testbed.runs.results import Run
+    from testbed.scenario.loader import load_scenario
+    from testbed.scenario.model import Scenario
 
-__version__ = "0.1.0"
 __all__ = [
     "Problem",
     "Run",
@@ -36,11 +38,11 @@ __all__ = [
 ]
 
 _LAZY = {
-    "Run": "testbed.results",
-    "Scenario": "testbed.scenario",
-    "load_scenario": "testbed.loader",
-    "open_run": "testbed.store",
-    "run": "testbed.runner",
+    "Run": "testbed.runs.results",
+    "Scenario": "testbed.scenario.model",
+    "load_scenario": "testbed.scenario.loader",
+    "open_run": "testbed.runs.folder",
+    "run": "testbed.chain.runner",
 }
 
 

@@ -25,7 +25,8 @@ def sample_times(start: int, n_time: int, sample_rate_hz: float) -> FloatArray:
 def random_stream(seed: int, *names: str) -> np.random.Generator:
     """Return the generator that belongs to `names` under `seed`.
 
-    Each name (sensor, noise term) has a stream of its own, so that adding or switching off one leaves the others bit-identical.
+    Each name (sensor, noise term) has a stream of its own, so that adding or switching off one leaves the others
+    bit-identical.
     """
     key = tuple(zlib.crc32(name.encode()) for name in names)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
@@ -57,8 +58,8 @@ class LinearFilter:
 
     .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
 
-    State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0 before the first sample;
-    a first sample other than zero is a step).
+    State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0
+    before the first sample; a first sample other than zero is a step).
 
     Parameters
     ----------
@@ -116,7 +117,8 @@ class LinearFilter:
 
 
 def companion(numerator: FloatArray, denominator: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return (A, B, C, D) of a transfer function in a companion form balanced by a diagonal scaling of powers of the corner.
+    """Return (A, B, C, D) of a transfer function in a companion form balanced by a diagonal scaling of powers of the
+    corner.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
 """Units at the border: strings with units in, SI floats inside.
 
 Angle and cycle are dimensions of their own, so that `10 rad/s` is no frequency, `1 Hz` no rate and `4 mrad` no number.
-Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(Hz)` and `deg/sqrt(h)` are both rad/sqrt(s).
-A temperature is absolute in `degC` and `K`; in a compound unit such as `ppm/degC` both are the same step. `g0` is standard gravity, `g` a gram.
+Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(Hz)` and `deg/sqrt(h)` are both
+rad/sqrt(s). A temperature is absolute in `degC` and `K`; in a compound unit such as `ppm/degC` both are the same step.
+`g0` is standard gravity, `g` a gram.
 """
 
 from __future__ import annotations

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from testbed.loader import load_scenario
+from testbed.scenario.loader import load_scenario
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from testbed.scenario import Scenario
+    from testbed.scenario.model import Scenario
 
 SHORT = """\
 name: short

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import importlib
 import inspect
 import pkgutil
@@ -15,9 +16,29 @@ import testbed
 from testbed.parts import Part
 
 ROOT = Path(testbed.__file__).parent
-FOUNDATION = {"errors", "parts", "units", "signals"}
-# Each room and what it may import of the house, besides the foundation and itself.
-ROOMS = {"models": set(), "sensors": {"models"}, "fusion": set(), "compensation": set()}
+FOUNDATION = {"errors", "parts", "units", "signals", "_version"}
+# Each room and what it may import of the house, besides the foundation and itself: the data flow, from the ground floor
+# up.
+ROOMS = {
+    "pages": set(),
+    "metrics": set(),
+    "allan": set(),
+    "compensation": set(),
+    "models": set(),
+    "fusion": set(),
+    "sensors": {"models", "allan"},
+    "runs": {"models", "fusion"},
+    "scenario": {"models", "sensors", "fusion"},
+    "report": {"pages", "metrics", "runs"},
+    "recording": {"pages", "metrics", "runs"},
+    "judging": {"metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
+    "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording"},
+    "drift": {"compensation", "allan", "judging", "pages", "runs", "models"},
+}
+# These join everything: the papers know all but the chain and the command line, nobody knows the command line.
+TOP = {"reproduce": {"chain", "cli"}, "cli": set()}
+# Files directly in the package: the foundation, the faces of package and command.
+LOOSE = FOUNDATION | {"__init__", "__main__"}
 MODULES = sorted(path for path in ROOT.rglob("*.py"))
 
 
@@ -29,6 +50,29 @@ def imports_of(path):
             yield from [parts[1]] if len(parts) > 1 else [alias.name for alias in node.names]
         elif isinstance(node, ast.Import):
             yield from [alias.name.split(".")[1] for alias in node.names if alias.name.startswith("testbed.")]
+
+
+def modules_of(path):
+    """Yield the dotted modules of the package that a module imports when it is loaded (not those for types, nor inside
+    functions).
+    """
+    waiting = list(ast.parse(path.read_text()).body)
+    known = {dotted(other) for other in MODULES}
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "testbed":
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            yield from [name if name in known else node.module for name in names]
+        elif isinstance(node, ast.Import):
+            yield from [alias.name for alias in node.names if alias.name.split(".")[0] == "testbed"]
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            waiting.extend(ast.iter_child_nodes(node))
+
+
+def dotted(path):
+    return ".".join(("testbed", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
 
 
 def room_of(path):
@@ -44,15 +88,63 @@ def test_rooms_import_one_way(path):
 
 
 @pytest.mark.contract
+@pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in TOP], ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_top_rooms_do_not_know_what_is_above_them(path):
+    assert not set(imports_of(path)) & TOP[room_of(path)]
+
+
+@pytest.mark.contract
+def test_every_module_has_a_room_and_every_room_a_rule():
+    folders = {path.name for path in ROOT.iterdir() if path.is_dir() and any(path.glob("*.py"))}
+    assert folders == set(ROOMS) | set(TOP)
+    assert {path.stem for path in ROOT.glob("*.py")} == LOOSE
+    assert len(LOOSE) <= 8
+
+
+@pytest.mark.contract
+def test_rooms_form_no_circle():
+    """The table of rules itself has an order, and no module needs, when it is loaded, one that needs it."""
+    assert list(graphlib.TopologicalSorter(ROOMS).static_order())
+    graph = {dotted(path): set(modules_of(path)) - {dotted(path)} for path in MODULES}
+    # A face hands on what its package holds, so a package that is imported for a part of it is no circle.
+    inner = {name: {other for other in found if not name.startswith(f"{other}.")} for name, found in graph.items()}
+    assert list(graphlib.TopologicalSorter(inner).static_order())
+
+
+@pytest.mark.contract
 @pytest.mark.parametrize("name", sorted(FOUNDATION))
 def test_the_foundation_knows_no_room(name):
     assert set(imports_of(ROOT / f"{name}.py")) <= FOUNDATION
 
 
+PUBLIC = {
+    "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError",
+    "testbed.cli": "main",
+    "testbed.models.mhd_channel": "MhdChannel Fluid one_mode_response",
+    "testbed.models.turntable": "Turntable TurntableParameters Mounting",
+    "testbed.sensors": "load_preset",
+    "testbed.sensors.noise": "GyroNoise",
+    "testbed.sensors.allan": "allan_deviation fit_allan",
+    "testbed.fusion": "estimate FILTERS EstimateBlock",
+    "testbed.fusion.belief": "load_belief",
+    "testbed.scenario": "Scenario",
+}
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("module", PUBLIC)
+def test_public_paths_stay(module):
+    """What users and checks import; everything else is no promise."""
+    assert [name for name in PUBLIC[module].split() if not hasattr(importlib.import_module(module), name)] == []
+
+
 def test_the_import_check_sees_a_planted_leak(tmp_path):
     leak = tmp_path / "leak.py"
-    leak.write_text("def process():\n    from testbed.models.turntable import Turntable\n    import testbed.pipeline\n")
-    assert set(imports_of(leak)) == {"models", "pipeline"}
+    leak.write_text(
+        "def process():\n    from testbed.models.turntable.turntable import Turntable\n    import "
+        "testbed.chain.pipeline\n"
+    )
+    assert set(imports_of(leak)) == {"models", "chain"}
 
 
 def public_callables():
@@ -62,7 +154,7 @@ def public_callables():
             continue
         module = importlib.import_module(info.name)
         for name, item in vars(module).items():
-            if name.startswith("_") or getattr(item, "__module__", None) != info.name or info.name == "testbed.cli":
+            if name.startswith("_") or getattr(item, "__module__", None) != info.name or info.name == "testbed.cli.app":
                 continue
             if inspect.isclass(item) or inspect.isfunction(item):
                 yield f"{info.name}.{name}", item
@@ -100,7 +192,9 @@ def test_docstring_names_every_argument(name):
     [name for name in sorted(CALLABLES) if inspect.isclass(CALLABLES[name]) and issubclass(CALLABLES[name], Part)],
 )
 def test_docstring_of_a_parameter_set_names_every_field(name):
-    """What `testbed list` and the schema offer is explained where it is defined; inherited fields where they are inherited from."""
+    """What `testbed list` and the schema offer is explained where it is defined; inherited fields where they are
+    inherited from.
+    """
     item = CALLABLES[name]
     doc = "\n".join(inspect.getdoc(base) or "" for base in item.__mro__ if hasattr(base, "model_fields"))
     assert [field for field in item.model_fields if not documented(doc, field)] == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import testbed
-from tests.test_loader import SCENARIOS
+from tests.scenario.test_loader import SCENARIOS
 
 
 @pytest.mark.slow

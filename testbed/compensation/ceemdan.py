@@ -32,7 +32,8 @@ def ceemdan(
 ) -> FloatArray:
     r"""Decompose a record into modes with the help of added noise, fastest first: :math:`x = \sum_k d_k + r`.
 
-    With M the local mean, E_k the k-th mode by `emd`, w_i white noise of unit variance and :math:`r_0 = x`, the improved variant [1]_ is
+    With M the local mean, E_k the k-th mode by `emd`, w_i white noise of unit variance and :math:`r_0 = x`, the
+    improved variant [1]_ is
 
     .. math:: r_k = \langle M(r_{k-1} + \beta_{k-1} E_k(w_i)) \rangle, \quad d_k = r_{k-1} - r_k, \quad \beta_k = \epsilon\,\sigma(r_k)
 
@@ -40,8 +41,8 @@ def ceemdan(
 
     .. math:: d_k = \langle E_1(r_{k-1} + \beta_{k-1} E_{k-1}(w_i)) \rangle, \quad r_k = r_{k-1} - d_k, \quad E_0(w) = w .
 
-    A noise that has no mode left adds nothing. The end is that of `emd`. Each trial has a random stream of its own; the result has the same
-    bits for any number of threads.
+    A noise that has no mode left adds nothing. The end is that of `emd`. Each trial has a random stream of its own; the
+    result has the same bits for any number of threads.
 
     Parameters
     ----------
@@ -68,7 +69,8 @@ def ceemdan(
     Raises
     ------
     ValueError
-        If the signal is empty, not one-dimensional or not finite, a count is below one, the noise negative or the variant unknown.
+        If the signal is empty, not one-dimensional or not finite, a count is below one, the noise negative or the
+        variant unknown.
 
     References
     ----------
@@ -95,7 +97,9 @@ def ceemdan(
 def _sum_of_rest(
     signal: FloatArray, amplitude: float, variant: Variant, stage: int, sifts: int, whites: FloatArray
 ) -> FloatArray:
-    """Return the sum over trials of what one more mode leaves of the signal; takes the noise's own mode out of `whites`."""
+    """Return the sum over trials of what one more mode leaves of the signal; takes the noise's own mode out of
+    `whites`.
+    """
     total = np.zeros(signal.size)
     for white in whites:
         added = amplitude * _noise_mode(white, variant, stage, sifts)
@@ -108,7 +112,9 @@ def _sum_of_rest(
 
 
 def _noise_mode(white: FloatArray, variant: Variant, stage: int, sifts: int) -> FloatArray:
-    """Return the part of the noise that this stage adds, and take it out of `white`: modes are made when they are needed."""
+    """Return the part of the noise that this stage adds, and take it out of `white`: modes are made when they are
+    needed.
+    """
     if variant == "classic" and stage == 0:
         return white
     mode: FloatArray = first_mode(white, sifts)

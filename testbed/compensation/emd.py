@@ -1,10 +1,11 @@
 """Empirical mode decomposition by a fixed number of sifts, in time proportional to the record.
 
-One sift takes the mean of two envelopes away, cubic splines through the maxima and through the minima. Conventions are those of EMD-signal
-with `FIXE` (extrema at samples, two mirrored extrema per side, not-a-knot ends), so that its modes are ours to rounding; on a flat top the
-extremum is the middle sample, rounded down.
+One sift takes the mean of two envelopes away, cubic splines through the maxima and through the minima. Conventions are
+those of EMD-signal with `FIXE` (extrema at samples, two mirrored extrema per side, not-a-knot ends), so that its modes
+are ours to rounding; on a flat top the extremum is the middle sample, rounded down.
 
-The kernels live in one file because numba's disk cache watches no other file than the kernel's own. They release the interpreter lock.
+The kernels live in one file because numba's disk cache watches no other file than the kernel's own. They release the
+interpreter lock.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -29,7 +30,9 @@ ROUNDING = 1e-12
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def find_extrema(x, maxima, minima):  # pragma: no cover
-    """Fill in the indices of the inner extrema and return how many there are; free of branches that noise would mispredict."""
+    """Fill in the indices of the inner extrema and return how many there are; free of branches that noise would
+    mispredict.
+    """
     n_max, n_min = 0, 0
     before, since = 0.0, 0
     for i in range(x.size - 1):
@@ -46,8 +49,9 @@ def find_extrema(x, maxima, minima):  # pragma: no cover
 def reflect(x, edge, maxima, minima):  # pragma: no cover
     """Return (centre, maxima skipped, minima skipped, edge is a maximum, edge is a minimum) of the mirror at one end.
 
-    Extrema come nearest the edge first. The mirror stands on the first extremum if the signal comes back beyond the second before the edge
-    and the images reach the edge; otherwise on the edge, which counts as an extremum if it lies beyond the second one.
+    Extrema come nearest the edge first. The mirror stands on the first extremum if the signal comes back beyond the
+    second before the edge and the images reach the edge; otherwise on the edge, which counts as an extremum if it lies
+    beyond the second one.
     """
     top_first = abs(maxima[0] - edge) < abs(minima[0] - edge)
     first, second = (maxima, minima) if top_first else (minima, maxima)
@@ -62,7 +66,9 @@ def reflect(x, edge, maxima, minima):  # pragma: no cover
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place_knots(x, extrema, left, right, knots, values):  # pragma: no cover
-    """Fill in the extrema of one kind with their images at both ends (centre, skipped, edge counts) and return how many."""
+    """Fill in the extrema of one kind with their images at both ends (centre, skipped, edge counts) and return how
+    many.
+    """
     n, last, k = extrema.size, x.size - 1, 0
     centre, skipped, edge = left
     for j in range(min(n, skipped + MIRRORED - edge) - 1, skipped - 1, -1):
@@ -86,7 +92,9 @@ def place_knots(x, extrema, left, right, knots, values):  # pragma: no cover
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def spline_slopes(knots, values, slopes, upper):  # pragma: no cover
-    """Solve the tridiagonal system of a cubic spline for its slopes at the knots: not-a-knot ends, natural ones for three knots."""
+    """Solve the tridiagonal system of a cubic spline for its slopes at the knots: not-a-knot ends, natural ones for
+    three knots.
+    """
     n = knots.size
     h, after = float(knots[1] - knots[0]), float(knots[2] - knots[1])
     d, d_after = (values[1] - values[0]) / h, (values[2] - values[1]) / after
@@ -160,8 +168,8 @@ def first_mode(x, sifts):  # pragma: no cover
 def emd(signal: FloatArray, *, sifts: int = 10) -> FloatArray:
     r"""Decompose a record into modes, fastest first: :math:`x = \sum_k m_k + r`.
 
-    Each mode is what `sifts` sifts leave of the residual before it. It ends when the residual has fewer than three extrema (or loses them
-    while it is sifted), when its range is 1e-12 of the signal's, or after 2 log2(n_time) modes.
+    Each mode is what `sifts` sifts leave of the residual before it. It ends when the residual has fewer than three
+    extrema (or loses them while it is sifted), when its range is 1e-12 of the signal's, or after 2 log2(n_time) modes.
 
     Parameters
     ----------

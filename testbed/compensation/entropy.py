@@ -1,4 +1,6 @@
-"""Entropy of a record by scale: of the order of neighbouring samples (permutation) and of their repetition (sample entropy)."""
+"""Entropy of a record by scale: of the order of neighbouring samples (permutation) and of their repetition (sample
+entropy).
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,8 @@ def coarse_grain(signal: FloatArray, scale: int) -> FloatArray:
 
 
 def permutation_entropy(signal: FloatArray, *, order: int = 4, delay: int = 1) -> float:
-    r"""Return the entropy of ordinal patterns over its largest value: :math:`-\sum_\pi p_\pi \ln p_\pi / \ln m!` (equations 8-10 of [1]_).
+    r"""Return the entropy of ordinal patterns over its largest value: :math:`-\sum_\pi p_\pi \ln p_\pi / \ln m!`
+    (equations 8-10 of [1]_).
 
     Of equal samples the earlier one counts as smaller.
 
@@ -63,7 +66,8 @@ def permutation_entropy(signal: FloatArray, *, order: int = 4, delay: int = 1) -
     Returns
     -------
     float
-        0 for a monotone record, ln 2 / ln m! at the least for one of long ups and downs of equal length, 1 for white noise [-].
+        0 for a monotone record, ln 2 / ln m! at the least for one of long ups and downs of equal length, 1 for white
+        noise [-].
 
     Raises
     ------
@@ -116,7 +120,9 @@ def multiscale_permutation_entropy(
 
 @njit(cache=True, nogil=True)
 def _count_repeats(x, by_size, order, tolerance):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Count pairs of patterns that agree for `order` samples, and for one more; `by_size` sorts the patterns by first sample."""
+    """Count pairs of patterns that agree for `order` samples, and for one more; `by_size` sorts the patterns by first
+    sample.
+    """
     alike, still_alike = 0, 0
     for a in range(by_size.size):
         i = by_size[a]
@@ -134,10 +140,11 @@ def _count_repeats(x, by_size, order, tolerance):  # type: ignore[no-untyped-def
 
 
 def sample_entropy(signal: FloatArray, tolerance: float, *, order: int = 2) -> float:
-    r"""Return :math:`-\ln(A/B)`: B pairs of patterns agree for m samples, A of them for one more (Richman and Moorman 2000).
+    r"""Return :math:`-\ln(A/B)`: B pairs of patterns agree for m samples, A of them for one more (Richman and Moorman
+    2000).
 
-    Two patterns agree if no pair of samples differs by `tolerance` or more. Patterns start at the first n_time - m samples in both counts;
-    none is compared with itself.
+    Two patterns agree if no pair of samples differs by `tolerance` or more. Patterns start at the first n_time - m
+    samples in both counts; none is compared with itself.
 
     Parameters
     ----------
@@ -151,12 +158,14 @@ def sample_entropy(signal: FloatArray, tolerance: float, *, order: int = 2) -> f
     Returns
     -------
     float
-        Entropy [-]: 0 if whatever agrees goes on agreeing, infinite if nothing does, NaN if nothing agrees to begin with.
+        Entropy [-]: 0 if whatever agrees goes on agreeing, infinite if nothing does, NaN if nothing agrees to begin
+        with.
 
     Raises
     ------
     ValueError
-        If `order` is below one, `tolerance` is not positive, the record has fewer than order + 2 samples or is not finite.
+        If `order` is below one, `tolerance` is not positive, the record has fewer than order + 2 samples or is not
+        finite.
     """
     if not tolerance > 0.0:
         msg = f"tolerance: expected a difference above 0, got {tolerance}"
@@ -174,7 +183,8 @@ def multiscale_sample_entropy(
 ) -> FloatArray:
     """Return the sample entropy of the coarse-grained record at each scale, the tolerance fixed by the record itself.
 
-    What averages out within a block then falls below the tolerance and counts as regular (Costa, Goldberger, Peng 2002).
+    What averages out within a block then falls below the tolerance and counts as regular (Costa, Goldberger, Peng
+    2002).
 
     Parameters
     ----------

@@ -77,8 +77,8 @@ class Features:
     lags : tuple of float
         Time constants of the low-passes, increasing [s].
     plays : tuple of float
-        Half widths of the play operators [K]. None by default: under one penalty with the rest they cost a factor of two
-        after one cycle (docs/compensation_models.md); the method `process` gives them a prior of their own.
+        Half widths of the play operators [K]. None by default: under one penalty with the rest they cost a factor of
+        two after one cycle (docs/compensation_models.md); the method `process` gives them a prior of their own.
     least_significant : float
         Step of the thermometer [K].
     slope_error : float
@@ -259,5 +259,7 @@ class Scaling:
         return excess
 
     def extrapolated(self, Z: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Return whether rows of standardised features `Z`, shape (n_row, n_feature), leave the box by over 5 % of its span."""
+        """Return whether rows of standardised features `Z`, shape (n_row, n_feature), leave the box by over 5 % of its
+        span.
+        """
         return self.outside(Z) > _MARGIN

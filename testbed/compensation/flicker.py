@@ -1,4 +1,6 @@
-"""Rows of a gyro's record are no independent samples: their noise is 1/f. Whitening makes least squares efficient under it."""
+"""Rows of a gyro's record are no independent samples: their noise is 1/f. Whitening makes least squares efficient under
+it.
+"""
 
 from __future__ import annotations
 

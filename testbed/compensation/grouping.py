@@ -62,12 +62,14 @@ def group_modes(
 ) -> ModeGroups:
     """Sort the rows of a decomposition into three contiguous groups.
 
-    - `period`: noise ends before the first mode with a mean period of `periods[0]` or more, drift begins at the first one with `periods[1]`
-      or more. 21 s is where angle random walk gives way to bias instability in the paper's gyro, 900 s the shortest thermal lag.
-    - `sample_entropy`: mixed is all between the first and the last mode whose sample entropy at `scale` is `threshold` or more. Faster ones
-      average out within a block, slower ones hardly move from block to block. At 1 Hz and scale 50 to 60 this is the paper's grouping.
-    - `permutation_entropy`: the same rule with permutation entropy, as the paper's text has it ("below 0.5 is noise"). Permutation entropy
-      only falls with the period, so no fast mode is ever below: the noise group comes out empty.
+    - `period`: noise ends before the first mode with a mean period of `periods[0]` or more, drift begins at the first
+      one with `periods[1]` or more. 21 s is where angle random walk gives way to bias instability in the paper's gyro,
+      900 s the shortest thermal lag.
+    - `sample_entropy`: mixed is all between the first and the last mode whose sample entropy at `scale` is `threshold`
+      or more. Faster ones average out within a block, slower ones hardly move from block to block. At 1 Hz and scale 50
+      to 60 this is the paper's grouping.
+    - `permutation_entropy`: the same rule with permutation entropy, as the paper's text has it ("below 0.5 is noise").
+      Permutation entropy only falls with the period, so no fast mode is ever below: the noise group comes out empty.
 
     Parameters
     ----------
@@ -92,7 +94,8 @@ def group_modes(
     Raises
     ------
     ValueError
-        If the modes are not rows, the rate is not positive, the method unknown, the periods fall, or no mode reaches the threshold.
+        If the modes are not rows, the rate is not positive, the method unknown, the periods fall, or no mode reaches
+        the threshold.
     """
     if modes.ndim != 2 or modes.shape[0] == 0:
         msg = f"modes: expected two axes, a mode per row and the residual last, got shape {modes.shape}"
@@ -112,7 +115,10 @@ def group_modes(
         entropy = _entropy_of(method)
         mixed = [k for k in range(n_mode) if not entropy(modes[k], [scale])[0] < threshold]
         if not mixed:
-            msg = f"modes: expected one with {method} of at least {threshold} at scale {scale}, got none; try method='period'"
+            msg = (
+                f"modes: expected one with {method} of at least {threshold} at scale {scale}, got none; try "
+                f"method='period'"
+            )
             raise ValueError(msg)
         begin, end = mixed[0], mixed[-1] + 1
     return ModeGroups(rows[:begin], rows[begin:end], rows[end:])

@@ -1,7 +1,7 @@
 """The model-only compensator: trained on other thermal cycles, frozen, applied sample by sample.
 
-The drift it subtracts follows from the thermometer alone. The rate never enters, so a true rate of any period passes with gain
-one, and a residual can be no smaller than the gyro's own noise allows except by chance.
+The drift it subtracts follows from the thermometer alone. The rate never enters, so a true rate of any period passes
+with gain one, and a residual can be no smaller than the gyro's own noise allows except by chance.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ class DriftModel:
     mean_rate : float
         Mean of the training rates [rad/s]: Earth rate and constant bias. For information; it is never subtracted.
     blocked_error : float
-        Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` and `process` of what
-        is new in each row [rad/s].
+        Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` and `process`
+        of what is new in each row [rad/s].
     features : Features
         What is formed of the temperature.
     scaling : Scaling
@@ -195,20 +195,22 @@ def train(
     seed: int = 0,
     block: float = 7200.0,
 ) -> DriftModel:
-    """Train a drift model on thermal cycles at constant true rate; one up-first and one down-first tell temperature from time.
+    """Train a drift model on thermal cycles at constant true rate; one up-first and one down-first tell temperature
+    from time.
 
-    The mean over all cycles is taken off before and given back to nobody: the drift is zero on average over the training rows, so
-    Earth rate and constant bias stay in the compensated rate. A rate that changes within a cycle is taken for drift; one that
-    changes between cycles (bias at turn-on) is not by `gradient` and `process`, where each cycle has a constant of its own.
+    The mean over all cycles is taken off before and given back to nobody: the drift is zero on average over the
+    training rows, so Earth rate and constant bias stay in the compensated rate. A rate that changes within a cycle is
+    taken for drift; one that changes between cycles (bias at turn-on) is not by `gradient` and `process`, where each
+    cycle has a constant of its own.
 
     Parameters
     ----------
     cycles : sequence of Record
         Training records at one sample rate.
     method : str
-        `gradient` (least squares under 1/f noise in powers of T, slope and gradient features), `lssvm` (the paper's machine on
-        the same features), `polynomial` (the baseline: ordinary least squares without gradients), or `process` (`gradient` with
-        hysteresis, a Gaussian process with priors by likelihood).
+        `gradient` (least squares under 1/f noise in powers of T, slope and gradient features), `lssvm` (the paper's
+        machine on the same features), `polynomial` (the baseline: ordinary least squares without gradients), or
+        `process` (`gradient` with hysteresis, a Gaussian process with priors by likelihood).
     features : Features, optional
         Other features than the method's own.
     seed : int

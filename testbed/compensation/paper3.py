@@ -1,7 +1,7 @@
 """Paper 3's compensation of one record, literally: decompose, group, filter, regress on the temperature, reconstruct.
 
-It trains on the very record that it corrects, as the paper does. Temperature and time are nearly one there, so that what it removes is
-largely true rate (docs/compensation_models.md): it is here to be audited, not to be used.
+It trains on the very record that it corrects, as the paper does. Temperature and time are nearly one there, so that
+what it removes is largely true rate (docs/compensation_models.md): it is here to be audited, not to be used.
 """
 
 from __future__ import annotations
@@ -44,9 +44,11 @@ class PaperOptions:
     noise : float
         Their standard deviation over the record's; not given, 0.2 is usual [-].
     grouping : {"sample_entropy", "permutation_entropy", "period"}
-        How modes are sorted. The text says permutation entropy, which cannot give the paper's groups; sample entropy does.
+        How modes are sorted. The text says permutation entropy, which cannot give the paper's groups; sample entropy
+        does.
     noise_modes : {"filter", "drop"}
-        Whether IMF1-4 pass through the Kalman filter, as the steps have it, or are left out, as section 4.3 may be read.
+        Whether IMF1-4 pass through the Kalman filter, as the steps have it, or are left out, as section 4.3 may be
+        read.
     factor : float or None
         s of equation (22); None: chosen by the whiteness of the innovation [-].
     ratio : float or None
@@ -56,7 +58,8 @@ class PaperOptions:
     fitness : {"training", "blocked"}
         Error that the wolves lower: on the training rows, as in the paper, or blocked cross-validation.
     log_search : bool
-        Search in logarithms. The paper's ranges of four and twelve decades cannot be searched otherwise; it does not say.
+        Search in logarithms. The paper's ranges of four and twelve decades cannot be searched otherwise; it does not
+        say.
     wolves, iterations : int
         Of the search; 50 and 20 in the paper.
     rows : int

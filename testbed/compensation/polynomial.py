@@ -98,8 +98,9 @@ def block_residuals(U: FloatArray, y: FloatArray, ridge: FloatArray, blocks: Seq
 def likeliest_ridge(U: FloatArray, y: FloatArray, group: NDArray[np.intp]) -> FloatArray:
     r"""Return the penalties under which the target is most likely: a Gaussian process, linear in its features.
 
-    Weights of group g have the prior N(0, p_g s^2), those of group -1 a flat one; the noise is white with variance s^2. With the flat
-    columns projected out of U and y, m rows left and both s^2 and the weights integrated or maximised out,
+    Weights of group g have the prior N(0, p_g s^2), those of group -1 a flat one; the noise is white with variance s^2.
+    With the flat columns projected out of U and y, m rows left and both s^2 and the weights integrated or maximised
+    out,
 
     .. math:: -2 \ln L = m \ln(y'y - b' M^{-1} b) + \ln |P M|, \quad M = U'U + P^{-1},\; b = U'y
 

@@ -1,4 +1,6 @@
-"""Two searches of a box for the least value: the grey wolves of paper 3, and scipy's differential evolution with a simplex behind it."""
+"""Two searches of a box for the least value: the grey wolves of paper 3, and scipy's differential evolution with a
+simplex behind it.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Rows for training: block means of several cycles, their contiguous folds, and the fits with their blocked cross-validation."""
+"""Rows for training: block means of several cycles, their contiguous folds, and the fits with their blocked
+cross-validation.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
 # Rows are means over at least this time [s], and longer for a machine whose cost is cubic.
 _AVERAGE = 100.0
 MOST_SUPPORT = 300
-# Standardised features: a kernel narrower than half a standard deviation learns time, one wider than a thousand is flat.
+# Standardised features: a kernel narrower than half a standard deviation learns time, one wider than a thousand is
+# flat.
 _GAMMAS, _WIDTHS2 = (1e-2, 1e6), (0.3, 1e6)
 # Smaller ones change nothing but let a cycle that leaves a feature undetermined do so.
 _PENALTIES = np.geomspace(1e-5, 1.0, 23)
@@ -97,7 +100,10 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
         raise ValueError(msg)
     shortest, total = min(cycle.duration for cycle in cycles), sum(cycle.duration for cycle in cycles)
     if not block > _AVERAGE or shortest < 2.0 * block:
-        msg = f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, got one of {shortest:g} s"
+        msg = (
+            f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, got one of "
+            f"{shortest:g} s"
+        )
         raise ValueError(msg)
     average = _AVERAGE if most is None else max(_AVERAGE, total / most)
     n_mean = max(1, round(average * rates.pop()))
@@ -152,9 +158,11 @@ def fit_polynomial(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
 
 
 def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift; returns as `fit_polynomial`.
+    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift; returns as
+    `fit_polynomial`.
 
-    The error is that of the whitened rows: what is new in a row beyond the noise before it, in units of the noise's variance.
+    The error is that of the whitened rows: what is new in a row beyond the noise before it, in units of the noise's
+    variance.
 
     Parameters
     ----------
@@ -168,7 +176,8 @@ def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
 
 
 def fit_process(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit as `fit_coloured`, but as a Gaussian process: prior variances of the largest likelihood, play operators with one of their own.
+    """Fit as `fit_coloured`, but as a Gaussian process: prior variances of the largest likelihood, play operators with
+    one of their own.
 
     So hysteresis is believed only as far as the cycles show it.
 

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 __all__ = ["FILTERS", "EstimateBlock", "estimate"]
 
 FILTERS = {
-    "kalman": "testbed.fusion.kalman:Kalman",
-    "shakf": "testbed.fusion.shakf:Shakf",
-    "arw_shakf": "testbed.fusion.arw_shakf:ArwShakf",
-    "arw_shakf_literal": "testbed.fusion.arw_shakf:ArwShakfLiteral",
-    "steady_state": "testbed.fusion.steady_state:SteadyState",
-    "complementary": "testbed.fusion.complementary:Complementary",
-    "blending": "testbed.fusion.blending:Blending",
-    "wideband": "testbed.fusion.wideband:Wideband",
-    "allan_srkf": "testbed.fusion.allan_srkf:AllanSrkf",
+    "kalman": "testbed.fusion.filters.kalman:Kalman",
+    "shakf": "testbed.fusion.filters.shakf:Shakf",
+    "arw_shakf": "testbed.fusion.filters.arw_shakf:ArwShakf",
+    "arw_shakf_literal": "testbed.fusion.filters.arw_shakf:ArwShakfLiteral",
+    "steady_state": "testbed.fusion.filters.steady_state:SteadyState",
+    "complementary": "testbed.fusion.filters.complementary:Complementary",
+    "blending": "testbed.fusion.filters.blending:Blending",
+    "wideband": "testbed.fusion.filters.wideband:Wideband",
+    "allan_srkf": "testbed.fusion.filters.allan_srkf:AllanSrkf",
 }
 
 
@@ -44,12 +44,13 @@ def estimate(
     name : str
         Registered filter, or ``package.module:Class``.
     readings : mapping of str to array_like, shape (n_sensor_samples,)
-        Readings of each sensor [rad/s]; all start at t = 0. Not finite means no reading. A sensor at 1/s of the fastest rate has
-        ceil(n / s) readings for n of the fastest; nothing is trimmed.
+        Readings of each sensor [rad/s]; all start at t = 0. Not finite means no reading. A sensor at 1/s of the fastest
+        rate has ceil(n / s) readings for n of the fastest; nothing is trimmed.
     sample_rate_hz : mapping of str to float
         Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
     belief : mapping or str, optional
-        What the filter believes about each sensor, or the name of a shipped belief; default equation (39) with the presets' noise.
+        What the filter believes about each sensor, or the name of a shipped belief; default equation (39) with the
+        presets' noise.
     **parameters : Any
         Fields of the filter's ``Parameters``, SI floats or strings with units.
 

@@ -1,4 +1,6 @@
-"""Bands of the online angle random walk N_k: limits and the R that each sets, shipped by name, and how they are calibrated."""
+"""Bands of the online angle random walk N_k: limits and the R that each sets, shipped by name, and how they are
+calibrated.
+"""
 
 from __future__ import annotations
 
@@ -102,10 +104,12 @@ def increment_variance(reading: ArrayLike) -> float:
 def calibrate_bands(
     freq_hz: FloatArray, increments: FloatArray, edges_hz: tuple[float, float] = (2.0, 6.3)
 ) -> tuple[float, float]:
-    """Return the thresholds of one sensor from a sweep of N_k over frequency at constant amplitude, such as 0.1-25 Hz at 1 deg/s.
+    """Return the thresholds of one sensor from a sweep of N_k over frequency at constant amplitude, such as 0.1-25 Hz
+    at 1 deg/s.
 
-    The thresholds are N_k / dT at the frequencies of the two band edges, interpolated in the logarithms of both. By default the low band
-    ends at 2 Hz, about the corner of the MHD sensor, and the mid band at 6.3 Hz, beyond the low-pass of the filtered gyro.
+    The thresholds are N_k / dT at the frequencies of the two band edges, interpolated in the logarithms of both. By
+    default the low band ends at 2 Hz, about the corner of the MHD sensor, and the mid band at 6.3 Hz, beyond the
+    low-pass of the filtered gyro.
 
     Parameters
     ----------
@@ -124,7 +128,8 @@ def calibrate_bands(
     Raises
     ------
     ValueError
-        If an edge lies outside the sweep, or N_k does not rise from one edge to the other (it cannot tell the bands apart).
+        If an edge lies outside the sweep, or N_k does not rise from one edge to the other (it cannot tell the bands
+        apart).
 
     References
     ----------
@@ -132,10 +137,16 @@ def calibrate_bands(
     """
     freq, level = np.asarray(freq_hz, float), np.asarray(increments, float)
     if not (np.all(np.diff(freq) > 0.0) and freq[0] <= edges_hz[0] < edges_hz[1] <= freq[-1]):
-        msg = f"edges_hz: expected two rising frequencies within a rising sweep of {freq[0]:g} to {freq[-1]:g} Hz, got {edges_hz}"
+        msg = (
+            f"edges_hz: expected two rising frequencies within a rising sweep of {freq[0]:g} to {freq[-1]:g} Hz, "
+            f"got {edges_hz}"
+        )
         raise ValueError(msg)
     low, high = np.exp(np.interp(np.log(edges_hz), np.log(freq), np.log(level)))
     if not low < high:
-        msg = f"increments: expected to rise from {edges_hz[0]:g} to {edges_hz[1]:g} Hz, got {low:g} and {high:g} rad^2/s^2"
+        msg = (
+            f"increments: expected to rise from {edges_hz[0]:g} to {edges_hz[1]:g} Hz, got {low:g} and {high:g} "
+            f"rad^2/s^2"
+        )
         raise ValueError(msg)
     return float(low), float(high)

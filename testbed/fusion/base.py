@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.kernels import CONVENTIONAL, JOSEPH, LARGEST_RATE, SQUARE_ROOT
+from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, LARGEST_RATE, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.parts import Part
 from testbed.units import Quantity
@@ -56,10 +56,10 @@ class EstimateBlock:
     rate, std : ndarray, shape (n_time,)
         Estimated rate and its reported standard deviation [rad/s].
     diagnostics : dict of str to ndarray, shape (n_time,)
-        As far as the filter has them, NaN where undefined (such as between the readings of a slow sensor). Innovations are those of (11),
-        before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
-        R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36).
-        N_<sensor> is N_k / dT of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
+        As far as the filter has them, NaN where undefined (such as between the readings of a slow sensor). Innovations
+        are those of (11), before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
+        R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
+        of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
         guard_hits counts how often a bound held R or Q so far.
     """
 
@@ -69,7 +69,9 @@ class EstimateBlock:
 
 
 def signal_noise_unit(order: int) -> str:
-    """Return the SI unit of q for a signal model of that order: (rad/s)^2/s for 1, and s^-2 more for each further order."""
+    """Return the SI unit of q for a signal model of that order: (rad/s)^2/s for 1, and s^-2 more for each further
+    order.
+    """
     return f"rad^2/s^{2 * order + 1}"
 
 
@@ -81,7 +83,8 @@ class FilterParameters(Part):
     order : int
         Number m of integrators between the white noise and the rate, 1 to 3.
     q : float
-        Its density [rad^2/s^(2m+1)], such as "0.3 (deg/s)^2/s" for order 1 or "1e6 (deg/s)^2/s^3" for order 2; None takes the filter's own.
+        Its density [rad^2/s^(2m+1)], such as "0.3 (deg/s)^2/s" for order 1 or "1e6 (deg/s)^2/s^3" for order 2; None
+        takes the filter's own.
     use_input_noise : bool
         Count the input noise of the belief as process noise.
     """
@@ -115,8 +118,8 @@ class FormParameters(FilterParameters):
     Parameters
     ----------
     form : {"joseph", "conventional", "square_root"}
-        What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite, to show it;
-        or a root D of P = D D' by QR decompositions.
+        What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite,
+        to show it; or a root D of P = D D' by QR decompositions.
     """
 
     form: Literal["joseph", "conventional", "square_root"] = "joseph"
@@ -216,7 +219,8 @@ class BlockFilter:
             raise ValueError(msg)
 
     def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is missing or no rate.
+        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is
+        missing or no rate.
 
         Parameters
         ----------

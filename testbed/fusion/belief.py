@@ -44,7 +44,9 @@ class Realisation:
     D: float
 
     def response(self, freq_hz: FloatArray) -> ComplexArray:
-        """Return C (s I - A)^-1 B + D [-] at s = 2 pi j f, complex, shape (n_freq,), for frequencies [Hz] of that shape."""
+        """Return C (s I - A)^-1 B + D [-] at s = 2 pi j f, complex, shape (n_freq,), for frequencies [Hz] of that
+        shape.
+        """
         s = 2j * np.pi * np.asarray(freq_hz, float)[:, None, None]
         state = np.linalg.solve(
             s * np.eye(self.B.size) - self.A, np.broadcast_to(self.B[:, None], (s.size, self.B.size, 1))
@@ -83,11 +85,13 @@ class SensorBelief(Part):
         return control.TransferFunction(list(self.numerator), list(self.denominator))
 
     def realisation(self) -> Realisation:
-        r"""Return the modal realisation whose states are the parts of the reading, so that all are of the size of the rate.
+        r"""Return the modal realisation whose states are the parts of the reading, so that all are of the size of the
+        rate.
 
         .. math:: G(s) = D + \sum_i r_i / (s - p_i)
 
-        A real pole is the state x' = p x + r u; a pair is a rotation. The output is the sum of the states (first ones of pairs).
+        A real pole is the state x' = p x + r u; a pair is a rotation. The output is the sum of the states (first ones
+        of pairs).
 
         Returns
         -------

@@ -1,7 +1,9 @@
-r"""The augmented linear model of the fusion filters, equations (7), (18)-(20) of paper 1 for any signal order and any sensors.
+r"""The augmented linear model of the fusion filters, equations (7), (18)-(20) of paper 1 for any signal order and any
+sensors.
 
-State x = [x_1, its m - 1 derivatives, states of sensor 1, states of sensor 2, ...]. x_1 [rad/s] is the true rate, driven through m integrators
-by white noise of density q; it drives every sensor, whose white input noise enters beside it.
+State x = [x_1, its m - 1 derivatives, states of sensor 1, states of sensor 2, ...]. x_1 [rad/s] is the true rate,
+driven through m integrators by white noise of density q; it drives every sensor, whose white input noise enters beside
+it.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ if TYPE_CHECKING:
 # Derivatives of the rate are kept per 10 ms, so that they are of the rate's own size in the band of interest.
 _TIME_UNIT = 1e-2
 _START_STD = math.radians(1.0)
-# The sensor states start close to rest but not certain: 1e-6 (deg/s)^2 would keep an error of the first reading for tens of seconds.
+# The sensor states start close to rest but not certain: 1e-6 (deg/s)^2 would keep an error of the first reading for
+# tens of seconds.
 _START_STD_SENSOR = math.radians(1e-2)
 _START_FREQ_HZ = 100.0
 
@@ -163,7 +166,10 @@ def continuous_model(
         H[i, part], H[i, 0] = one.C, one.D
         if use_input_noise and sensor.input_noise > 0.0:
             if one.D != 0.0:
-                msg = f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; give it as output_noise, or add a pole"
+                msg = (
+                    f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; give it as output_noise, "
+                    f"or add a pole"
+                )
                 raise ValueError(msg)
             Qc[part, part] = sensor.input_noise**2 * np.outer(one.B, one.B)
         at = part.stop
@@ -175,7 +181,8 @@ def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, Float
 
     .. math:: F = e^{A T}, \quad Q = \int_0^T e^{A s} Q_c e^{A' s} ds
 
-    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or cancel otherwise.
+    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or
+    cancel otherwise.
 
     Parameters
     ----------
@@ -202,9 +209,11 @@ def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, Float
 
 
 def covariance_root(P: FloatArray) -> FloatArray:
-    """Return D with D D' = P for a positive semidefinite P [state^2], lower triangular, shape (n_state, n_state) [state].
+    """Return D with D D' = P for a positive semidefinite P [state^2], lower triangular, shape (n_state, n_state)
+    [state].
 
-    By the eigenvalues of the correlations, so that a state of small variance keeps its digits beside one of large variance.
+    By the eigenvalues of the correlations, so that a state of small variance keeps its digits beside one of large
+    variance.
     """
     std = np.sqrt(np.diag(P))
     scale = np.where(std > 0.0, std, 1.0)

@@ -139,7 +139,8 @@ class FogThermalStage:
 
     A place is :math:`e_i = T_a - T_i` behind the ambient temperature, :math:`\dot e_i = \dot T_a - e_i / \tau_i`; with
     T_a straight between samples exactly :math:`e_i^+ = a e_i + \frac{1 - a}{h} (T_a^+ - T_a)`, a = e^-h, h = T/tau_i.
-    Kept instead of T_i, e_i loses no digits at a fast clock and is the rate of temperature, :math:`\dot T_i = e_i / \tau_i`.
+    Kept instead of T_i, e_i loses no digits at a fast clock and is the rate of temperature, :math:`\dot T_i = e_i /
+    \tau_i`.
 
     Parameters
     ----------

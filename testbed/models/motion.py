@@ -50,8 +50,8 @@ class CommandBlock:
     start : int
         Index k of the first step; t_k = k / sample_rate.
     rate, angle : ndarray, shape (n_time + 1,)
-        Commanded rate [rad/s] and its integral [rad] at t_start ... t_(start + n_time): one more than the steps, so that the
-        change over the last step is known.
+        Commanded rate [rad/s] and its integral [rad] at t_start ... t_(start + n_time): one more than the steps, so
+        that the change over the last step is known.
     rate_mid, angle_mid : ndarray, shape (n_time,)
         The same at mid-step.
     """
@@ -95,8 +95,8 @@ def ramp(t: FloatArray, length: float) -> FloatArray:
 class MotionProfile:
     """The commanded motion of a run, block by block.
 
-    The angle is the integral of the rate from t = 0, by Simpson's rule over each step and its midpoint; the sum is carried from block to
-    block in the same order, so that any division into blocks gives the same bits.
+    The angle is the integral of the rate from t = 0, by Simpson's rule over each step and its midpoint; the sum is
+    carried from block to block in the same order, so that any division into blocks gives the same bits.
 
     Parameters
     ----------

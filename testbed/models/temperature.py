@@ -23,7 +23,8 @@ RampRate = Annotated[float, Quantity("K/s", "0.1 K/min", above=0.0)]
 
 
 class ChamberStep(Part):
-    """One step of a thermal chamber: ``{hold: 2 h}``, ``{ramp: 60 degC, rate: 0.1 K/min}`` or ``{ramp: 60 degC, over: 1 h}``.
+    """One step of a thermal chamber: ``{hold: 2 h}``, ``{ramp: 60 degC, rate: 0.1 K/min}`` or ``{ramp: 60 degC, over: 1
+    h}``.
 
     Parameters
     ----------
@@ -64,8 +65,8 @@ class ChamberStep(Part):
 class TemperatureProfile(Part):
     """Temperature around all instruments, one of three.
 
-    ``25 degC``: constant; ``{start, stop, over}``: a straight line; ``{start, steps: [{hold: 2 h}, {ramp: 60 degC, rate:
-    0.1 K/min}]}``: the programme of a thermal chamber. The last temperature is held.
+    ``25 degC``: constant; ``{start, stop, over}``: a straight line; ``{start, steps: [{hold: 2 h}, {ramp: 60 degC,
+    rate: 0.1 K/min}]}``: the programme of a thermal chamber. The last temperature is held.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from testbed.palette import rgb
+from testbed.pages.palette import rgb
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

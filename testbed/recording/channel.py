@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from testbed.palette import mix, rgb
+from testbed.pages.palette import mix, rgb
 from testbed.recording.stream import FRAMES, Batch
 from testbed.recording.world import INK, nice_ceiling
 

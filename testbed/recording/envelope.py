@@ -19,8 +19,8 @@ N_BINS = 4000  # more than a screen has columns, so min and max per bin draw the
 class Envelope:
     """Choose real samples of a stream so that no extreme is lost: argmin and argmax per bin, every sample of a window.
 
-    Bins are counted from sample 0, so any division of the stream into blocks chooses the same samples. The first and the last
-    sample are always among them; samples that are not finite never are (they cannot be drawn).
+    Bins are counted from sample 0, so any division of the stream into blocks chooses the same samples. The first and
+    the last sample are always among them; samples that are not finite never are (they cannot be drawn).
 
     Parameters
     ----------

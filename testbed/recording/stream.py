@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from testbed.palette import rgb
+from testbed.pages.palette import rgb
 from testbed.recording.envelope import Envelope
 
 if TYPE_CHECKING:
@@ -48,7 +48,9 @@ class Clock:
         return stamps.astype("timedelta64[ns]")
 
     def envelope(self, stride: int, *, detailed: bool) -> Envelope:
-        """Return the chooser for a signal with a sample at every `stride`-th base sample; without detail, extremes only."""
+        """Return the chooser for a signal with a sample at every `stride`-th base sample; without detail, extremes
+        only.
+        """
         start, end = (round(t * self.sample_rate_hz) for t in self.detail)
         window = (-(-start // stride), end // stride + 1) if detailed else (0, 0)
         return Envelope(-(-self.n_time // stride), window)
@@ -78,7 +80,8 @@ class Recording:
 
 
 class Batch:
-    """Rows held back until there are enough of them: Rerun keeps an entry in memory for every chunk, so many small ones add up.
+    """Rows held back until there are enough of them: Rerun keeps an entry in memory for every chunk, so many small ones
+    add up.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from testbed.palette import TRUTH, rgb
+from testbed.pages.palette import TRUTH, rgb
 from testbed.recording.bodies import draw_bodies
 from testbed.recording.stream import FRAMES, Batch
 

@@ -12,7 +12,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from testbed.errors import RunError
-from testbed.palette import series_colors
+from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
 from testbed.recording.layout import blueprint
 from testbed.recording.stream import Clock, Recording, Signal
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     import mujoco
 
-    from testbed.pipeline import RunBlock
+    from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
 
 APPLICATION = "testbed"
@@ -33,10 +33,11 @@ FLUSH_TIMEOUT = 60.0  # s; a disk slower than this for the last few MB is taken 
 
 
 class RecordingWriter:
-    """Write a run to an .rrd file: bodies, rates, errors, temperatures, diagnostics and velocity profiles on the timeline `sim_time`.
+    """Write a run to an .rrd file: bodies, rates, errors, temperatures, diagnostics and velocity profiles on the
+    timeline `sim_time`.
 
-    A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample, and, if it
-    is a rate or an error, every sample inside `detail`. Samples that are not finite are left out.
+    A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample,
+    and, if it is a rate or an error, every sample inside `detail`. Samples that are not finite are left out.
 
     Parameters
     ----------

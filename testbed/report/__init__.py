@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.errors import Problem, ScenarioError
-from testbed.palette import series_colors
+from testbed.pages.palette import series_colors
+from testbed.pages.template import render
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
-from testbed.report.template import render
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
-from testbed.store import write_text
+from testbed.runs.folder import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,8 +24,8 @@ REPORT = "report.html"
 def write_report(run_dir: Path) -> Path:
     """Write ``report.html`` from ``run.nc``, ``metrics.json`` and ``scenario.yaml`` of a finished run folder.
 
-    Signals are read in blocks, so that memory does not grow with the duration. The page is written beside and renamed: an earlier one stays
-    whole until the new one is.
+    Signals are read in blocks, so that memory does not grow with the duration. The page is written beside and renamed:
+    an earlier one stays whole until the new one is.
 
     Parameters
     ----------

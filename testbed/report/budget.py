@@ -1,4 +1,6 @@
-"""The noise budget of a report: which sensor is good where, what each leaves in the floor by band, and what the filters made of it."""
+"""The noise budget of a report: which sensor is good where, what each leaves in the floor by band, and what the filters
+made of it.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.report.drawing import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.numbers import plain, significant
+from testbed.pages.svg import INK, STYLE
 from testbed.report.figures import DASHES
-from testbed.report.numbers import plain, significant
-from testbed.report.svg import INK, STYLE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

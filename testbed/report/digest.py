@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.report.envelope import Envelope
-from testbed.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
+from testbed.metrics.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
+from testbed.pages.envelope import Envelope
 
 if TYPE_CHECKING:
     from testbed.report.folder import RunData, RunMetrics, Signal
@@ -37,9 +37,10 @@ class RateTrace:
 class ErrorTrace:
     """An error against the truth [rad/s].
 
-    `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error| <= 2 std; None for a sensor.
-    `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short; `band_rms` the error
-    [rad/s] in each band of the noise budget, None where the spectrum does not reach.
+    `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error| <=
+    2 std; None for a sensor. `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty
+    if the record is too short; `band_rms` the error [rad/s] in each band of the noise budget, None where the spectrum
+    does not reach.
     """
 
     whole: Envelope
@@ -61,7 +62,9 @@ class ThermalTrace:
 
 @dataclass(frozen=True)
 class Digest:
-    """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter; `thermal` of those with a thermometer."""
+    """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter; `thermal` of those with a
+    thermometer.
+    """
 
     duration_s: float
     settle_s: float
@@ -74,7 +77,9 @@ class Digest:
 
 
 def zoom_window(metrics: RunMetrics, still: float = 1.0) -> tuple[float, float]:
-    """Return (start, stop) [s] of the zoom: two periods of the slowest line, or `still` [s], from settle on, as far as the run reaches."""
+    """Return (start, stop) [s] of the zoom: two periods of the slowest line, or `still` [s], from settle on, as far as
+    the run reaches.
+    """
     lines = [freq for freq in metrics.line_freq_hz if freq > 0]
     length = 2.0 / lines[0] if lines else still
     return metrics.settle_s, min(metrics.settle_s + length, metrics.duration_s)
@@ -207,7 +212,9 @@ def _count_inside(error: FloatArray, sigma: FloatArray) -> tuple[int, int]:
 
 
 def _band_rms(welch: WelchDensity | None, metrics: RunMetrics) -> tuple[float | None, ...]:
-    """Return the root mean square in each band of the noise budget; None for a band that the spectrum covers in part only."""
+    """Return the root mean square in each band of the noise budget; None for a band that the spectrum covers in part
+    only.
+    """
     found: list[float | None] = []
     for band in metrics.budget.bands if metrics.budget else []:
         if welch is None or welch.n_segments == 0 or band.low_hz < welch.freq_hz[FIRST_FREQ]:

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.report.drawing import HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, rate_unit, time_axis
-from testbed.report.numbers import plain, significant
-from testbed.report.svg import INK, STYLE
+from testbed.pages.axes import HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, rate_unit, time_axis
+from testbed.pages.numbers import plain, significant
+from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -89,7 +89,8 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
 
 
 def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
-    """Draw the error of each filter over time in a panel of its own, with the band of two standard deviations it predicts.
+    """Draw the error of each filter over time in a panel of its own, with the band of two standard deviations it
+    predicts.
 
     Parameters
     ----------
@@ -150,7 +151,9 @@ def _settled_extreme(trace: ErrorTrace, settle_s: float) -> float:
 
 
 def _common_limits(extremes: Mapping[str, float]) -> dict[str, float]:
-    """Return the half height of each panel [deg/s]: the same for all whose extremes lie within a factor of four of the next."""
+    """Return the half height of each panel [deg/s]: the same for all whose extremes lie within a factor of four of the
+    next.
+    """
     limits: dict[str, float] = {}
     previous, shared = 0.0, 0.0
     for name, extreme in sorted(extremes.items(), key=lambda item: -item[1]):
@@ -241,7 +244,8 @@ def _frame_spectrum(axes: Axes, digest: Digest) -> None:
 
 
 def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
-    """Draw what the temperature does to the sensors that have a thermometer: its readings above, error and true drift below.
+    """Draw what the temperature does to the sensors that have a thermometer: its readings above, error and true drift
+    below.
 
     Parameters
     ----------

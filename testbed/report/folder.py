@@ -35,7 +35,9 @@ class LineMetrics(_Metrics):
 
 
 class ConsistencyMetrics(_Metrics):
-    """How a filter's claims hold [-]: normalised error squared, per sensor (further keys) innovations and their whiteness, and the verdict."""
+    """How a filter's claims hold [-]: normalised error squared, per sensor (further keys) innovations and their
+    whiteness, and the verdict.
+    """
 
     nees: float | None = None
     verdict: str | None = None
@@ -218,7 +220,8 @@ class RunData:
         """Return how many samples of `reference` lie in one step of `signal`; it must be a whole number."""
         ratio = reference.sample_rate_hz / signal.sample_rate_hz
         stride = round(ratio)
-        # Rates come from the last time stamp: rounding leaves a relative error of about 1e-12, a drift of one sample over the run is 1 / n.
+        # Rates come from the last time stamp: rounding leaves a relative error of about 1e-12, a drift of one sample
+        # over the run is 1 / n.
         if stride < 1 or abs(ratio - stride) * signal.n_time > 0.5 or (signal.n_time - 1) * stride >= reference.n_time:
             message = (
                 f"expected a time that steps by whole samples of truth inside its span, got a ratio of {ratio:.9g}"

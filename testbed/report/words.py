@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from testbed.report.numbers import plain, significant
+from testbed.pages.numbers import plain, significant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,7 +38,9 @@ def over_bound(source: SourceMetrics, column: str) -> float | None:
 
 
 def summary(metrics: RunMetrics, digest: Digest) -> str:
-    """Return the paragraph that says what came out: the best filter, against the sensors and the floor, its honesty, the expectations."""
+    """Return the paragraph that says what came out: the best filter, against the sensors and the floor, its honesty,
+    the expectations.
+    """
     parts = [
         f"The run lasted {plain(metrics.duration_s)} s; everything is judged from {plain(metrics.settle_s)} s on.",
         *_accuracy(metrics),
@@ -89,7 +91,9 @@ def _honesty(metrics: RunMetrics, digest: Digest) -> list[str]:
 
 
 def honesty(inside: float) -> str:
-    """Return what a share `inside` of errors within two standard deviations says about a filter's own std (95.4 % if Gaussian)."""
+    """Return what a share `inside` of errors within two standard deviations says about a filter's own std (95.4 % if
+    Gaussian).
+    """
     if inside < 0.90:
         return "is too small for the error it makes"
     if inside > 0.99:
@@ -98,7 +102,9 @@ def honesty(inside: float) -> str:
 
 
 def claims(metrics: RunMetrics) -> dict[str, dict[str, Any]]:
-    """Return by filter the rows of the table of consistency: sensor -> value and bound of NIS and whiteness, of filters that have a verdict."""
+    """Return by filter the rows of the table of consistency: sensor -> value and bound of NIS and whiteness, of filters
+    that have a verdict.
+    """
     rows = {}
     for name, source in metrics.fusion.items():
         if source.consistency is not None and source.consistency.verdict is not None:

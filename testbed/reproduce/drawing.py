@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from testbed.report.numbers import decade, plain
-from testbed.report.svg import INK, STYLE
-from testbed.store import write_bytes
+from testbed.pages.numbers import decade, plain
+from testbed.pages.svg import INK, STYLE
+from testbed.runs.folder import write_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

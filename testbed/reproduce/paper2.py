@@ -1,7 +1,7 @@
 """Paper 2's protocol on the simulated sensors: scale factor, linearity and noise at standstill.
 
-Jiang, Li, Liu, Tuo, Chinese Journal of Sensors and Actuators 2022 no. 9. One clock reads both sensors, which feel the same rate: the chain
-is driven by exact sines, since the table has no torque for 50 deg/s at 60 Hz.
+Jiang, Li, Liu, Tuo, Chinese Journal of Sensors and Actuators 2022 no. 9. One clock reads both sensors, which feel the
+same rate: the chain is driven by exact sines, since the table has no torque for 50 deg/s at 60 Hz.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from testbed.fusion.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.fusion.belief import load_belief
+from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
+from testbed.metrics.spectra import WelchDensity, log_average
 from testbed.sensors import load_preset
-from testbed.spectra import WelchDensity, log_average
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -43,9 +43,11 @@ class Protocol:
     linear_amplitudes, linear_frequencies : tuple of float
         Grid of the linearity [deg/s], [Hz].
     settle, observe, linear_observe : float
-        Time before each measurement, and least time of it for scale factor and linearity; it lasts a whole number of periods [s].
+        Time before each measurement, and least time of it for scale factor and linearity; it lasts a whole number of
+        periods [s].
     warm_up, standstill : float
-        Time at standstill before linearity and the record of the noise, until the gain of the gyro has settled, and that record's length [s].
+        Time at standstill before linearity and the record of the noise, until the gain of the gyro has settled, and
+        that record's length [s].
     """
 
     scale_amplitudes: tuple[float, ...] = (20.0, 30.0, 40.0, 50.0)
@@ -108,8 +110,8 @@ def mhd_response(freq_hz: FloatArray) -> ComplexArray:
 def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, stage: AllanSrkf) -> list[float]:
     """Return the amplitude of each channel for a sine.
 
-    Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise referred to the rate
-    does, and what leaks of a drift into the k-th line falls as k^-5 then.
+    Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise
+    referred to the rate does, and what leaks of a drift into the k-th line falls as k^-5 then.
 
     Parameters
     ----------
@@ -182,9 +184,11 @@ def settle_filter(seed: int, protocol: Protocol, **parameters: Any) -> Callable[
 
 
 def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
-    """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of `CHANNELS` [-].
+    """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of
+    `CHANNELS` [-].
 
-    Every amplitude has noise of its own: the same noise in all of them would cancel. The filter has settled at standstill before each frequency.
+    Every amplitude has noise of its own: the same noise in all of them would cancel. The filter has settled at
+    standstill before each frequency.
 
     Parameters
     ----------
@@ -239,7 +243,8 @@ def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[Flo
 
 
 def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters: Any) -> Iterator[str]:
-    """Run the whole protocol, write scale_factor.csv, linearity.csv and noise_psd.csv, and yield the tables line by line.
+    """Run the whole protocol, write scale_factor.csv, linearity.csv and noise_psd.csv, and yield the tables line by
+    line.
 
     Parameters
     ----------

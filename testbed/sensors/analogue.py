@@ -132,8 +132,8 @@ class DelayStage:
 class SaturationStage:
     r"""Rails that charge with the overload: :math:`\tau \dot q = e - q`, e = x - clip(x), output clip(x + q).
 
-    After an overload of E that lasted long the output stays at the rail until E exp(-t/tau) no longer lifts the signal to it,
-    then creeps back with tau. The overload is taken as constant over each sample period.
+    After an overload of E that lasted long the output stays at the rail until E exp(-t/tau) no longer lifts the signal
+    to it, then creeps back with tau. The overload is taken as constant over each sample period.
 
     Parameters
     ----------

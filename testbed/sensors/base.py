@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from testbed.models.turntable_parameters import Mounting
+from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import Frequency
@@ -74,8 +74,8 @@ class ProfiledStage(SensorStage, Protocol):
 class ThermalStage(SensorStage, Protocol):
     """An instrument with a thermometer inside, whose bias follows the temperature; both are of the last block.
 
-    `temperature` holds the thermometer's readings [K], one per reading of the rate; `drift` the true thermal bias [rad/s], one
-    value per sample of the input, which no user of the instrument knows.
+    `temperature` holds the thermometer's readings [K], one per reading of the rate; `drift` the true thermal bias
+    [rad/s], one value per sample of the input, which no user of the instrument knows.
     """
 
     temperature: FloatArray

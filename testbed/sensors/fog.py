@@ -45,8 +45,8 @@ class Fog(Sensor, GyroTerms):
 
     .. math:: y_j = \frac{1}{T} \int_{t_j - T}^{t_j} L[(1 + s + s_T (T_c - T_0)) w + b] \, dt + n_j
 
-    with the low-pass L, the thermal bias b and coil temperature T_c of `thermal`, and the noise n of the readings. Before
-    t = 0 all has been as at t = 0.
+    with the low-pass L, the thermal bias b and coil temperature T_c of `thermal`, and the noise n of the readings.
+    Before t = 0 all has been as at t = 0.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ class Fog(Sensor, GyroTerms):
         return (corner,), (1.0, corner)
 
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Return indicated over true rate at the reference temperature: scale factor, low-pass, mean of the 20 kHz samples.
+        """Return indicated over true rate at the reference temperature: scale factor, low-pass, mean of the 20 kHz
+        samples.
 
         Parameters
         ----------
@@ -110,7 +111,9 @@ class Fog(Sensor, GyroTerms):
         return self.range
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
-        """Return the noise referred to the true rate, infinite above half the sample rate; see `Sensor.input_noise_psd`."""
+        """Return the noise referred to the true rate, infinite above half the sample rate; see
+        `Sensor.input_noise_psd`.
+        """
         # A grid that ends at half the sample rate may end a rounding above it.
         seen = freq_hz <= 0.5 * self.sample_rate * (1.0 + 1e-9)
         density = np.full(freq_hz.shape, np.inf)
@@ -142,8 +145,8 @@ class Fog(Sensor, GyroTerms):
 class FogStage:
     """A fibre-optic gyro in time; made by `Fog.start`.
 
-    `temperature` holds the thermometer's readings of the last block [K], at the instants of the rate; `drift` the thermal
-    bias as its axis feels it [rad/s], at the input's clock.
+    `temperature` holds the thermometer's readings of the last block [K], at the instants of the rate; `drift` the
+    thermal bias as its axis feels it [rad/s], at the input's clock.
     """
 
     def __init__(self, fog: Fog, input_rate_hz: float, seed: int, name: str) -> None:

@@ -1,4 +1,6 @@
-"""What a gyro does to a rate besides noise and low-pass: constant errors before it, the clock of the readings behind it."""
+"""What a gyro does to a rate besides noise and low-pass: constant errors before it, the clock of the readings behind
+it.
+"""
 
 from __future__ import annotations
 
@@ -171,7 +173,8 @@ class Fir:
         if self._weights.size == 1 or not u.size:
             return u
         y: FloatArray
-        # With a second coefficient, though zero, below: a lone one would choose a convolution that depends on the block.
+        # With a second coefficient, though zero, below: a lone one would choose a convolution that depends on the
+        # block.
         y, self._state = lfilter(self._weights, [1.0, 0.0], u, zi=self._state)
         return y
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
-from testbed.models.channel_ring import ChannelRing
-from testbed.models.mhd_channel import MhdChannel
-from testbed.models.thermal_drift import REFERENCE
+from testbed.models.mhd_channel.channel import MhdChannel
+from testbed.models.mhd_channel.ring import ChannelRing
+from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer

@@ -1,4 +1,6 @@
-"""CEEMDAN: against the equations written out with the peer's sifting, the same bits for any thread count, and Colominas' claim."""
+"""CEEMDAN: against the equations written out with the peer's sifting, the same bits for any thread count, and
+Colominas' claim.
+"""
 
 from __future__ import annotations
 
@@ -85,10 +87,12 @@ def test_modes_add_up_to_the_signal(variant):
 
 @pytest.mark.property
 def test_the_improved_variant_leaves_less_noise_and_fewer_modes():
-    """Colominas 2014: the classic variant averages modes of tone + noise, so that 1/sqrt(trials) of the noise stays in them.
+    """Colominas 2014: the classic variant averages modes of tone + noise, so that 1/sqrt(trials) of the noise stays in
+    them.
 
-    A tone alone: every mode but one is spurious. The noise is 0.2 of the tone and most of white noise is in its first mode, hence the bounds
-    of the classic first mode; the improved one holds only what sifting of tone + noise leaves of the tone's local mean.
+    A tone alone: every mode but one is spurious. The noise is 0.2 of the tone and most of white noise is in its first
+    mode, hence the bounds of the classic first mode; the improved one holds only what sifting of tone + noise leaves of
+    the tone's local mean.
     """
     tone, trials = np.sin(2.0 * np.pi * np.arange(4000) / 100.0), 20
     for seed in range(3):

@@ -39,13 +39,16 @@ def test_modes_are_those_of_the_peer(n_time):
 
 
 def test_two_tones_come_apart():
-    """Frequencies 1:20 are far beyond what sifting cannot tell apart (Rilling and Flandrin 2008: 1:1.5 at equal amplitude)."""
+    """Frequencies 1:20 are far beyond what sifting cannot tell apart (Rilling and Flandrin 2008: 1:1.5 at equal
+    amplitude).
+    """
     t = np.arange(4000)
     fast, slow = np.sin(2.0 * np.pi * t / 10.3), np.sin(2.0 * np.pi * t / 206.0)
     modes = emd(fast + slow)
     inner = slice(400, -400)
-    # A cubic spline through the crests of the fast tone, every 10.3 samples, follows the slow one to (2 pi 10.3/206)^4/384 = 3e-5; its
-    # crests are met at samples only, at worst half a sample off: 1 - cos(pi/10.3) = 5 %, which ten sifts spread and mostly average out.
+    # A cubic spline through the crests of the fast tone, every 10.3 samples, follows the slow one to (2 pi
+    # 10.3/206)^4/384 = 3e-5; its crests are met at samples only, at worst half a sample off: 1 - cos(pi/10.3) = 5 %,
+    # which ten sifts spread and mostly average out.
     assert np.std(modes[0][inner] - fast[inner]) < 0.05 * np.std(fast)
     assert np.std(modes[1:].sum(axis=0)[inner] - slow[inner]) < 0.05 * np.std(slow)
 

@@ -38,10 +38,12 @@ def test_permutation_entropy_is_antropys(order, delay):
 
 def test_permutation_entropy_of_known_orders():
     assert permutation_entropy(np.arange(50.0)) == 0.0
-    # Long ups and downs in equal parts: two patterns at one half each, the turns aside (two patterns of each kind in a thousand samples).
+    # Long ups and downs in equal parts: two patterns at one half each, the turns aside (two patterns of each kind in a
+    # thousand samples).
     zigzag = np.abs((np.arange(100_000) % 2000) - 1000.0)
     assert permutation_entropy(zigzag, order=4) == pytest.approx(math.log(2.0) / math.log(24.0), rel=0.05)
-    # White noise: 1 less (m! - 1)/(2 N ln m!), the bias of an entropy by counts; its scatter is of the same order (2e-4 here).
+    # White noise: 1 less (m! - 1)/(2 N ln m!), the bias of an entropy by counts; its scatter is of the same order (2e-4
+    # here).
     white = np.random.default_rng(1).standard_normal(20_000)
     assert permutation_entropy(white, order=4) == pytest.approx(1.0, abs=6.0 * 23 / (2 * 20_000 * math.log(24.0)))
 
@@ -77,7 +79,9 @@ def test_sample_entropy_is_antropys_and_brute_force(order):
 
 
 def test_multiscale_sample_entropy_of_white_noise_is_its_closed_form():
-    """Two independent normal means of s samples agree within r sigma with probability erf(r sqrt(s) / 2), whatever came before."""
+    """Two independent normal means of s samples agree within r sigma with probability erf(r sqrt(s) / 2), whatever came
+    before.
+    """
     white = np.random.default_rng(3).standard_normal(60_000)
     found = multiscale_sample_entropy(white, (10, 20, 60), tolerance=0.2)
     for value, scale in zip(found, (10, 20, 60), strict=True):

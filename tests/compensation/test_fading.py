@@ -51,7 +51,9 @@ def test_agrees_with_a_plain_loop_and_with_filterpy(rng, s):
 @pytest.mark.parametrize("s", [0.3, 0.583, 1.0, 1.5])
 @pytest.mark.parametrize("q", [1e-9, 1e-4, 0.3, 20.0])
 def test_settles_to_the_closed_form(s, q):
-    """A step of one after 20,000 zeros: the first answer is the gain. Slowest: (1 - K) sqrt(s), K = 3e-5 at s = 1, q = 1e-9."""
+    """A step of one after 20,000 zeros: the first answer is the gain. Slowest: (1 - K) sqrt(s), K = 3e-5 at s = 1, q =
+    1e-9.
+    """
     n = 400_000 if s == 1.0 and q < 1e-6 else 20_000
     z = np.zeros(n)
     z[-1] = 1.0

@@ -1,4 +1,6 @@
-"""Temperature features against scipy and a plain play operator; causal, block-invariant, proof against the thermometer's steps."""
+"""Temperature features against scipy and a plain play operator; causal, block-invariant, proof against the
+thermometer's steps.
+"""
 
 from __future__ import annotations
 

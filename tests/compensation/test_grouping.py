@@ -44,9 +44,11 @@ def test_groups_are_contiguous_and_complete(method):
 
 
 def test_permutation_entropy_of_a_mode_is_a_gauge_of_its_period():
-    """White noise and a random walk have nothing in common but the periods of their modes, and the same entropies at the same periods.
+    """White noise and a random walk have nothing in common but the periods of their modes, and the same entropies at
+    the same periods.
 
-    From 0.98 at three samples per period it falls to that of long ups and downs, ln 2 / ln 24; so "below 0.5" holds for slow modes only.
+    From 0.98 at three samples per period it falls to that of long ups and downs, ln 2 / ln 24; so "below 0.5" holds for
+    slow modes only.
     """
     rng, points = np.random.default_rng(2), []
     for signal in (rng.standard_normal(60_000), np.cumsum(rng.standard_normal(60_000))):
@@ -59,7 +61,8 @@ def test_permutation_entropy_of_a_mode_is_a_gauge_of_its_period():
     white, walk = points
     assert white[0, 1] == pytest.approx(0.98, abs=0.01)
     assert white[-1, 1] == pytest.approx(math.log(2.0) / math.log(24.0), abs=0.02)
-    # The entropy falls by 0.2 an octave near the fastest mode and is bent there: a straight line between modes is off by some 0.05.
+    # The entropy falls by 0.2 an octave near the fastest mode and is bent there: a straight line between modes is off
+    # by some 0.05.
     same_period = np.interp(np.log(walk[:, 0]), np.log(white[:, 0]), white[:, 1])
     off = np.abs(same_period - walk[:, 1])[walk[:, 0] > white[0, 0]]
     assert off[0] < 0.05
@@ -67,7 +70,9 @@ def test_permutation_entropy_of_a_mode_is_a_gauge_of_its_period():
 
 
 def test_groups_by_sample_entropy_are_cut_at_the_first_and_last_irregular_mode():
-    """White noise held for a block keeps its size when averaged (-ln erf(0.1) = 2.2); what is faster averages out, what is slower repeats."""
+    """White noise held for a block keeps its size when averaged (-ln erf(0.1) = 2.2); what is faster averages out, what
+    is slower repeats.
+    """
     held = np.repeat(np.random.default_rng(4).standard_normal((2, 1500)), 55, axis=1)
     fast, slow, residual = tones([3.0, 50_000.0], held.shape[1])
     groups = group_modes(np.array([fast, *held, slow, residual]), 1.0, method="sample_entropy", scale=55)
@@ -75,7 +80,9 @@ def test_groups_by_sample_entropy_are_cut_at_the_first_and_last_irregular_mode()
 
 
 def gyro_record(seed):
-    """Return a day at 1 Hz: white and flicker noise that cross within a minute, and a slow drift four times as large [rad/s]."""
+    """Return a day at 1 Hz: white and flicker noise that cross within a minute, and a slow drift four times as large
+    [rad/s].
+    """
     n = 85_200
     noise = GyroNoise(angle_random_walk=2.3e-7, bias_instability=2.2e-8).sample(n, 1.0, seed)
     t = np.arange(n) / n
@@ -83,7 +90,9 @@ def gyro_record(seed):
 
 
 def test_sample_entropy_reproduces_the_papers_groups_and_permutation_entropy_does_not():
-    """IMF1-4 noise, IMF5-10 mixed, the rest drift, at scale 50 to 60; modes of plain EMD halve in frequency like those of the paper."""
+    """IMF1-4 noise, IMF5-10 mixed, the rest drift, at scale 50 to 60; modes of plain EMD halve in frequency like those
+    of the paper.
+    """
     for seed in (1, 2):
         modes = emd(gyro_record(seed))
         for scale in (50, 55, 60):

@@ -8,10 +8,10 @@ import json
 import numpy as np
 import pytest
 
+from testbed.allan import allan_deviation, fit_allan
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.compensation.record import Record
 from testbed.compensation.training import block_means
-from testbed.sensors.allan import allan_deviation, fit_allan
 from tests.compensation.thermal_record import DEG_H, UNSEEN, cycle
 
 SEEDS = range(6)
@@ -71,7 +71,9 @@ def test_after_two_cycles_blocks_scatter_little_more_than_with_the_drift_known(t
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["gradient", "process"])
 def test_one_cycle_at_two_rates_tells_temperature_from_time(table, method):
-    """It crosses each temperature at two rates and comes back: every programme meets the limits of two cycles, the worst one too."""
+    """It crosses each temperature at two rates and comes back: every programme meets the limits of two cycles, the
+    worst one too.
+    """
     assert np.median(table[method, "two rates"][..., 0]) >= 6.0
     assert np.median(table[method, "two rates"][..., 1]) <= 1.25
     assert np.max(table[method, "two rates"][..., 1]) < np.max(table[method, 1][..., 1])
@@ -81,7 +83,8 @@ def test_one_cycle_at_two_rates_tells_temperature_from_time(table, method):
 def test_compensation_leaves_the_noise_coefficients_alone(models, cycles):
     """Issue 5: N by less than 2 %, B by less than 6 %, weighted fit, against the same record before.
 
-    Before, the drift is no term of the noise model: the fit is of averaging times up to 300 s, where it is below the noise.
+    Before, the drift is no term of the noise model: the fit is of averaging times up to 300 s, where it is below the
+    noise.
     """
     for seed in (7, 8):
         unseen = cycle("slow_up", seed).record
@@ -103,7 +106,9 @@ def test_the_drift_does_not_depend_on_the_rate(models, method, rng):
 @pytest.mark.property
 @pytest.mark.parametrize("method", ["gradient", "polynomial", "process"])
 def test_a_true_rate_passes_whole(models, method):
-    """Issue 5: gain 1.00 +- 0.01 from 10 s to 6 h. The rate does not enter the drift, so it is one to rounding of the rate."""
+    """Issue 5: gain 1.00 +- 0.01 from 10 s to 6 h. The rate does not enter the drift, so it is one to rounding of the
+    rate.
+    """
     unseen = cycle("slow_up", 9).record
     t = np.arange(unseen.rate.size)
     base = models[method].apply(unseen)

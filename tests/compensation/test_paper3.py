@@ -1,4 +1,6 @@
-"""Paper 3's pipeline with modes of known content: what its steps do, and that training on the record itself removes true rate."""
+"""Paper 3's pipeline with modes of known content: what its steps do, and that training on the record itself removes
+true rate.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def test_noise_modes_are_filtered_or_left_out(unseen):
 
 
 def test_training_on_the_record_removes_true_rate_and_so_fails_any_audit(unseen):
-    """A sine of 6 h and 0.05 deg/h: with slope beside temperature the machine learns time, and less than a tenth survives."""
+    """A sine of 6 h and 0.05 deg/h: with slope beside temperature the machine learns time, and less than a tenth
+    survives.
+    """
     t = np.arange(unseen.record.rate.size)
     rate = 0.05 * DEG_H * np.sin(2.0 * np.pi * t / 21_600.0)
     moved = Record(unseen.record.rate + rate, unseen.record.temperature, 1.0)

@@ -51,7 +51,9 @@ def test_whitened_least_squares_is_generalised_least_squares(rng):
 
 @pytest.mark.oracle
 def test_whitening_makes_the_noise_of_a_gyro_white(rng):
-    """Flicker drawn in frequency by the tests' generator, means over 100 s; autocorrelations of n white values spread by 1/sqrt(n)."""
+    """Flicker drawn in frequency by the tests' generator, means over 100 s; autocorrelations of n white values spread
+    by 1/sqrt(n).
+    """
     n = 85_200
     rows = block_means(WHITE * rng.normal(size=n) + flicker(n, rng), 100)
     white = solve_triangular(noise_root(rows.size, 1.7), rows - rows.mean(), lower=True)
@@ -62,7 +64,9 @@ def test_whitening_makes_the_noise_of_a_gyro_white(rng):
 
 @pytest.mark.parametrize("noise", [1e-9, 0.0])
 def test_features_that_determine_nothing_get_no_weight(rng, noise):
-    """A chamber that never moved: only rounding is left of every feature, and the drift is zero; also of a rate that never moved."""
+    """A chamber that never moved: only rounding is left of every feature, and the drift is zero; also of a rate that
+    never moved.
+    """
     still = Record(1e-7 + noise * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
     rows = gather([still], Features(plays=(3.0,)), block=7200.0)
     for fit in (fit_polynomial, fit_coloured, fit_process):
@@ -93,7 +97,9 @@ def test_cycles_that_cannot_be_blocked_are_refused(rng):
 
 @pytest.mark.oracle
 def test_the_likeliest_ridge_is_the_top_of_the_likelihood_of_a_gaussian_process(rng):
-    """-2 ln L from the covariance of the target itself, rows by rows, noise variance at its best, no projection and no identity."""
+    """-2 ln L from the covariance of the target itself, rows by rows, noise variance at its best, no projection and no
+    identity.
+    """
     U, group = rng.normal(size=(60, 5)), np.array([-1, 0, 0, 1, 1])
     U[:, 0] = 1.0
     y = U @ np.array([7.0, 1.0, -2.0, 0.2, -0.1]) + rng.normal(size=60)
@@ -115,7 +121,9 @@ def test_the_likeliest_ridge_is_the_top_of_the_likelihood_of_a_gaussian_process(
 
 
 def test_the_process_has_a_prior_for_hysteresis_alone(rng):
-    """A drift by temperature without hysteresis; the groups from the names of the features. With one group the weights differ."""
+    """A drift by temperature without hysteresis; the groups from the names of the features. With one group the weights
+    differ.
+    """
     features = Features(lags=(), plays=(3.0, 10.0))
     still = record(rng)
     moved = Record(still.rate + 1e-9 * (still.temperature - 293.15), still.temperature, 1.0)
@@ -123,6 +131,7 @@ def test_the_process_has_a_prior_for_hysteresis_alone(rng):
     U, v = whiten(rows.Z, rows.y, rows.cycles, 1.7)
     group = np.array([-1, -1, *(int(name.startswith("play")) for name in features.names)])
     expected, alone = (penalised(U, v, likeliest_ridge(U, v, each))[2:] for each in (group, np.minimum(group, 0)))
-    # Both searches stop near a flat top: a corner of 1.7 and of 100 x 0.017 differ by rounding, prior variances by some 10 %.
+    # Both searches stop near a flat top: a corner of 1.7 and of 100 x 0.017 differ by rounding, prior variances by some
+    # 10 %.
     assert np.allclose(fit_process(rows)[0].weights, expected, rtol=0.0, atol=1e-4 * np.abs(expected).max())
     assert np.abs(expected[-2:]).max() < 0.5 * np.abs(alone[-2:]).max()

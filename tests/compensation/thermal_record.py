@@ -1,7 +1,8 @@
-"""A gyro in a thermal chamber, written for these tests alone: other chain of lags and other hysteresis than the simulator's.
+"""A gyro in a thermal chamber, written for these tests alone: other chain of lags and other hysteresis than the
+simulator's.
 
-The thermometer sits on the case (one lag behind the chamber) and reads in steps; the coil follows the case, the gradient is that
-between two shells, so no true term is exactly one of the model's features.
+The thermometer sits on the case (one lag behind the chamber) and reads in steps; the coil follows the case, the
+gradient is that between two shells, so no true term is exactly one of the model's features.
 """
 
 from __future__ import annotations

@@ -16,9 +16,11 @@ FULL_SCALE = {"mhd_ars": 10.0 * DEG, "mems_gyro": 500.0 * DEG}
 LENGTH, BEGIN, END = 1.5, 0.30, 0.31  # of the record and the fault [s]
 MHD_CORNER = 33_900.0 / 2_178.0  # slow pole of equation (39) [rad/s]
 AMPLITUDE = 1.0 * DEG
-# SHAKF takes what a railed MHD sensor did for noise of the gyro, and only falls back slowly: all that is bounded is the fault itself.
+# SHAKF takes what a railed MHD sensor did for noise of the gyro, and only falls back slowly: all that is bounded is the
+# fault itself.
 BLAMES_THE_OTHER = {"shakf"}
-# R of `allan_srkf` has infinite memory within its clamp of 10: after a spike the noise may be sqrt(10) times as large for minutes.
+# R of `allan_srkf` has infinite memory within its clamp of 10: after a spike the noise may be sqrt(10) times as large
+# for minutes.
 REMEMBERS = {"allan_srkf": 10.0**0.5}
 
 pytestmark = pytest.mark.contract
@@ -111,10 +113,11 @@ def check_sane(block):
 @pytest.mark.parametrize("fault", LASTING, ids=lambda f: f.__name__)
 @pytest.mark.parametrize("name", FILTERS)
 def test_what_a_lasting_fault_leaves_is_bounded(name, fault, sensor):
-    """A false reading J of the AC-coupled sensor over D seconds looks like a change of J w D in the rate, w its slow pole.
+    """A false reading J of the AC-coupled sensor over D seconds looks like a change of J w D in the rate, w its slow
+    pole.
 
-    That trace stays until the gyro takes it back, which needs minutes. A missing reading stands for the signal's own size.
-    Half as much again is for the filter's own time to settle.
+    That trace stays until the gyro takes it back, which needs minutes. A missing reading stands for the signal's own
+    size. Half as much again is for the filter's own time to settle.
     """
     block, injected = estimate_with(fault, name, sensor)
     check_sane(block)
@@ -127,7 +130,9 @@ def test_what_a_lasting_fault_leaves_is_bounded(name, fault, sensor):
 @pytest.mark.parametrize("fault", SINGLE, ids=lambda f: f.__name__)
 @pytest.mark.parametrize("name", FILTERS)
 def test_a_single_bad_reading_is_forgotten(name, fault, sensor):
-    """After ten time constants of the AC-coupled sensor (0.64 s) the error is that of the fault-free run, however large the spike."""
+    """After ten time constants of the AC-coupled sensor (0.64 s) the error is that of the fault-free run, however large
+    the spike.
+    """
     block, _ = estimate_with(fault, name, sensor)
     check_sane(block)
     rate, clean = readings()[0], fault_free(name)

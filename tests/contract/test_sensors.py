@@ -69,7 +69,8 @@ def test_any_blocks_give_the_same_bits(name, sizes):
 def test_instances_have_streams_of_their_own(name):
     sensor, rate = load_preset(name), np.zeros(20_000)
     a, b = (sensor.start(FS, 3, instance).process(rate) for instance in ("left", "right"))
-    # n independent pairs correlate with a standard deviation of 1/sqrt(n); low-passed noise has fewer: count 2 per hertz of 4.5 Hz at least.
+    # n independent pairs correlate with a standard deviation of 1/sqrt(n); low-passed noise has fewer: count 2 per
+    # hertz of 4.5 Hz at least.
     n_independent = min(a.size, 9)
     assert not np.array_equal(a, b)
     assert abs(np.corrcoef(np.diff(a), np.diff(b))[0, 1]) < 5 / np.sqrt(n_independent)
@@ -81,7 +82,8 @@ def test_noise_off_equals_the_response(name):
     sensor = load_preset(name).model_copy(update={"noise": False})
     freq, settle, n = 10.0, 30.0, 10
     t = np.arange(int((settle + n / freq) * FS)) / FS
-    # The eq. (39) low-pass has a pole at 0.105 rad/s: a smooth start and 30 s of waiting leave exp(-3) of almost nothing.
+    # The eq. (39) low-pass has a pole at 0.105 rad/s: a smooth start and 30 s of waiting leave exp(-3) of almost
+    # nothing.
     readings = sensor.sample(0.01 * np.sin(2 * np.pi * freq * t) * np.clip(t / 5.0, 0, 1), FS)
     tr = np.arange(readings.size) / sensor.sample_rate
     last = tr >= settle
@@ -217,7 +219,9 @@ def output(sensor):
     ("name", "key"), [(name, key) for name in PRESETS for key in keys(load_preset(name)) if key != "mounting"]
 )
 def test_every_key_changes_the_output(name, key):
-    """No key is silently ignored: each changes readings or response of each preset (where it sits: see the plant's tests)."""
+    """No key is silently ignored: each changes readings or response of each preset (where it sits: see the plant's
+    tests).
+    """
     sensor = load_preset(name)
     if key.endswith("_drift"):
         sensor = sensor.model_copy(update={"temperature": 310.0})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from testbed.fusion.runaway import critical_q
+from testbed.fusion.analysis.runaway import critical_q
 
 if TYPE_CHECKING:
     from types import ModuleType

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from testbed.models.channel_ring import ChannelRing
-from testbed.models.mhd_channel import MhdChannel
+from testbed.models.mhd_channel.channel import MhdChannel
+from testbed.models.mhd_channel.ring import ChannelRing
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -113,7 +113,9 @@ def test_example_prints_and_draws(name: str, options: list[str], tmp_path: Path)
 
 
 def test_a_filter_just_switched_on_is_less_linear_than_a_settled_one() -> None:
-    """Its gain of the gyro falls as 1/t from the whole band on: after 20 s 20 times narrower, so a factor of two is far inside."""
+    """Its gain of the gyro falls as 1/t from the whole band on: after 20 s 20 times narrower, so a factor of two is far
+    inside.
+    """
     program = load("paper2_linearity")
     short = replace(program.PAPER, linear_amplitudes=(10.0, 20.0, 30.0, 40.0, 50.0), linear_observe=2.0, settle=0.1)
     fresh, settled = (program.ratios(1, replace(short, warm_up=seconds)) for seconds in (0.0, 20.0))

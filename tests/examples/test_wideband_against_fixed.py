@@ -61,7 +61,9 @@ def test_changed_beliefs_are_off_by_what_is_said() -> None:
 @pytest.mark.parametrize("sensor", ["mhd_ars", "mems_gyro"])
 @pytest.mark.parametrize(("key", "factor"), [("gain", 1.05), ("gain", 0.95), ("corner", 1.05), ("corner", 0.95)])
 def test_a_wrong_belief_costs_what_it_forces(sensor: str, key: str, factor: float) -> None:
-    """At most 1.3 sqrt(ideal^2 + forced^2), 5 % of scale factor or corner, both signs, both sensors; 10 Hz, where both count."""
+    """At most 1.3 sqrt(ideal^2 + forced^2), 5 % of scale factor or corner, both signs, both sensors; 10 Hz, where both
+    count.
+    """
     wrong = example.BELIEF | {sensor: example.changed(example.BELIEF[sensor], **{key: factor})}
     error, ideal, forced = example.mismatch_ratios(10.0, example.MISMATCH_AT[10.0], wrong, (31, 32), 2.0).T
     assert np.all(error <= 1.3 * np.hypot(ideal, forced))
@@ -69,7 +71,9 @@ def test_a_wrong_belief_costs_what_it_forces(sensor: str, key: str, factor: floa
 
 @pytest.mark.parametrize("label", list(example.CHANGES))
 def test_a_change_in_the_middle_costs_no_more_than_a_third(label: str) -> None:
-    """From 0.1 s after the change on, against the second signal from the start; slow states that a fast signal spoilt would cost 20 times."""
+    """From 0.1 s after the change on, against the second signal from the start; slow states that a fast signal spoilt
+    would cost 20 times.
+    """
     for seed in (31, 32):
         real, ideal, peak = example.change_errors(label, seed, 4.0)
         # Without belief error the bound of a wrong belief is 1.3 of the ideal; NaN would fail.

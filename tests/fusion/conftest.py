@@ -1,4 +1,6 @@
-"""The filters' equations once more, with matrices and Python loops, and readings of the linear sensors of equation (39)."""
+"""The filters' equations once more, with matrices and Python loops, and readings of the linear sensors of equation
+(39).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The filters on the four signals of paper 1, sensors of equation (39) with the presets' noise, phase included, last 10 s of 20 s."""
+"""The filters on the four signals of paper 1, sensors of equation (39) with the presets' noise, phase included, last 10
+s of 20 s.
+"""
 
 from __future__ import annotations
 

@@ -69,7 +69,8 @@ def test_realisation_equals_transfer_function(poles: list[float], angle: float, 
     freq = np.geomspace(0.01, 1e3, 9)
     wanted = transfer(list(belief.numerator), list(belief.denominator), freq)
     largest = np.abs(transfer(list(belief.numerator), list(belief.denominator), np.geomspace(1e-3, 1e5, 400))).max()
-    # Neighbouring poles differ by at least a factor 1.78; partial fractions of five of them cancel by at most about 1e4.
+    # Neighbouring poles differ by at least a factor 1.78; partial fractions of five of them cancel by at most about
+    # 1e4.
     np.testing.assert_allclose(belief.realisation().response(freq), wanted, rtol=1e-9, atol=1e-10 * largest)
 
 

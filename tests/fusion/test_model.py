@@ -23,7 +23,8 @@ def _eq39(order: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 def test_van_loan_equals_quadrature(T: float) -> None:
     A, Qc, _ = _eq39(2)
     F, Q = van_loan(A, Qc, T)
-    # Gauss-Legendre on pieces that shrink towards 0, where the 8500 rad/s mode lives: 30 nodes are exact for e^(-85 s/T) there.
+    # Gauss-Legendre on pieces that shrink towards 0, where the 8500 rad/s mode lives: 30 nodes are exact for e^(-85
+    # s/T) there.
     edges = np.concatenate([[0.0], T * 0.5 ** np.arange(22)[::-1]])
     nodes, weights = np.polynomial.legendre.leggauss(30)
     wanted = np.zeros_like(Q)
@@ -80,7 +81,8 @@ def test_discrete_model_has_the_bode_of_a_hold(row: int, name: str) -> None:
     slow = freq <= 10.0
     w = 2 * np.pi * freq[slow]
     delayed = transfer(list(sensor.numerator), list(sensor.denominator), freq[slow]) * np.exp(-0.5j * w * T)
-    # Beyond half a step of delay a hold differs by (wT)^2/24 and by aliases, f/fs of the gain that is left at fs: below f/fs = 5e-4.
+    # Beyond half a step of delay a hold differs by (wT)^2/24 and by aliases, f/fs of the gain that is left at fs: below
+    # f/fs = 5e-4.
     np.testing.assert_allclose(ours[slow], delayed, rtol=5e-4)
 
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.stats import chi2, kstwobign
 
 from testbed.fusion import FILTERS
+from testbed.fusion.analysis.optimum import optimum, settled_filters
 from testbed.fusion.belief import load_belief
 from testbed.fusion.model import build_model, covariance_root
-from testbed.fusion.optimum import optimum, settled_filters
 from testbed.parts import resolve
 from testbed.signals import random_stream
 
@@ -27,11 +27,14 @@ INSTANTS = (20, 200, 1000, 2999)  # where NEES is judged; single runs are indepe
 # One miss in a thousand over all that is compared: per filter four NEES, two NIS, two periodograms.
 MISS = 1e-3 / (8 * len(FILTERS))
 
-# What adapts R to the innovations is not consistent, not even with its own model for the truth. (lowest, highest) found over the runs.
+# What adapts R to the innovations is not consistent, not even with its own model for the truth. (lowest, highest) found
+# over the runs.
 DEPARTS = {
-    # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to 25 times too small.
+    # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to
+    # 25 times too small.
     "shakf": {"nees": (100.0, 600.0), "nis_mhd_ars": (0.6, 0.9)},
-    # A band sets R of the gyro 10 to 100 times above the true one: innovations far smaller than claimed, the estimate is hardly touched.
+    # A band sets R of the gyro 10 to 100 times above the true one: innovations far smaller than claimed, the estimate
+    # is hardly touched.
     "arw_shakf": {"nees": (0.5, 1.7), "nis_mems_gyro": (0.01, 0.3)},
     "arw_shakf_literal": {"nees": (0.5, 1.7), "nis_mems_gyro": (0.5, 0.75), "nis_mhd_ars": (0.7, 0.9)},
 }
@@ -41,7 +44,9 @@ pytestmark = [pytest.mark.contract, pytest.mark.oracle]
 
 @dataclass(frozen=True)
 class Found:
-    """Normalised error squared (run, instant), and normalised innovations of the last two thirds, all runs one after the other."""
+    """Normalised error squared (run, instant), and normalised innovations of the last two thirds, all runs one after
+    the other.
+    """
 
     nees: FloatArray
     innovations: dict[str, FloatArray]
@@ -125,7 +130,9 @@ def test_innovations_are_as_large_as_claimed(name: str, sensor: str) -> None:
 
 
 def cumulative_periodogram(series: FloatArray) -> float:
-    """Return the largest distance of the cumulated periodogram from a straight line, times the root of its number of ordinates."""
+    """Return the largest distance of the cumulated periodogram from a straight line, times the root of its number of
+    ordinates.
+    """
     power = np.abs(np.fft.rfft(series))[1:-1] ** 2
     rising = np.cumsum(power) / np.sum(power)
     return float(np.max(np.abs(rising - np.arange(1, power.size + 1) / power.size)) * np.sqrt(power.size))

@@ -59,8 +59,8 @@ def test_lags_meet_an_ode_solver() -> None:
     heat, slope = coil - T0, (T - coil) / model.coil_lag
     wanted = model.linear * heat + model.quadratic * heat**2 + model.cubic * heat**3
     wanted += (model.shupe + model.shupe_temperature * heat) * slope + model.gradient * (coil - spool)
-    # Straight lines between samples lose (w T)^2 / 12 = 7.5e-7 of the 10 K at 2100 s; through the coil's lag 3e-6 K are left,
-    # times w S = 4e-7 rad/s/K: 1e-12, a millionth of the bias.
+    # Straight lines between samples lose (w T)^2 / 12 = 7.5e-7 of the 10 K at 2100 s; through the coil's lag 3e-6 K are
+    # left, times w S = 4e-7 rad/s/K: 1e-12, a millionth of the bias.
     np.testing.assert_allclose(model.bias(T, 1.0), wanted, rtol=0, atol=1e-12)
 
 
@@ -234,6 +234,7 @@ def test_terms_alone_over_the_papers_oven() -> None:
     }
     for group, bias in alone.items():
         print(f"{group}: {np.rad2deg(bias.std()) * 3600.0:.3f} deg/h")
-    # The terms add up, and the hysteresis is what the half-widths allow: 4 K at 2e-3 and 12 K at 1e-3 deg/h/K to both sides.
+    # The terms add up, and the hysteresis is what the half-widths allow: 4 K at 2e-3 and 12 K at 1e-3 deg/h/K to both
+    # sides.
     np.testing.assert_allclose(sum(alone.values()), model.bias(oven, 1.0), rtol=0, atol=1e-18)
     assert np.rad2deg(np.ptp(alone["hysteresis"])) * 3600.0 == pytest.approx(0.04, rel=1e-6)

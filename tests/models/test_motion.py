@@ -31,7 +31,8 @@ def test_ramp_is_smooth_to_the_second_derivative():
     assert value[x <= 0].max() == 0.0
     assert value[x >= 1].min() == 1.0
     assert np.all(np.diff(value) >= 0)
-    # The second derivative is continuous: it changes by at most h times the third (60 at the ends) from sample to sample, plus rounding.
+    # The second derivative is continuous: it changes by at most h times the third (60 at the ends) from sample to
+    # sample, plus rounding.
     assert np.max(np.abs(np.diff(value, 3))) / h**2 < 61 * h + 4e-16 * 8 / h**2
 
 
@@ -50,7 +51,8 @@ def test_process_integrates_the_angle():
     """Constant rate 0.1 rad/s with a symmetric ramp of 0.5 s: angle = 0.1 (t - 0.25) afterwards."""
     block = MotionProfile([lambda t: np.full_like(t, 0.1)], 0.5, FS).process(40_000)
     t = np.arange(40_001) / FS
-    # Simpson's rule over a polynomial of degree 5: h^4 / 2880 times the fourth derivative (720 / 0.5^4), far below rounding of the sum.
+    # Simpson's rule over a polynomial of degree 5: h^4 / 2880 times the fourth derivative (720 / 0.5^4), far below
+    # rounding of the sum.
     assert_allclose(block.angle[10_000:], 0.1 * (t[10_000:] - 0.25), rtol=1e-12)
     assert_allclose(block.angle_mid[10_000:], 0.1 * (t[10_000:-1] + 0.5 / FS - 0.25), rtol=1e-12)
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from testbed.models.earth import EarthRate
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
-from testbed.models.turntable import Mounting, TruthBlock, Turntable, TurntableParameters
+from testbed.models.turntable.earth import EarthRate
+from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters
 from testbed.signals import random_stream
 
 FS = 20_000.0
@@ -59,8 +59,8 @@ def test_the_whole_plant_holds_a_still_sensor_against_gravity() -> None:
     got = truth("servo")
     mean = got.specific_force["gyro"].mean(axis=0)
     x, y, _ = MOUNTING.position
-    # Over whole periods the tangential part is nothing; the centripetal mean is A^2 / 2 times the lever (less the ramp of
-    # 0.2 s: up to a fifth) and the platform rocks by a few urad.
+    # Over whole periods the tangential part is nothing; the centripetal mean is A^2 / 2 times the lever (less the ramp
+    # of 0.2 s: up to a fifth) and the platform rocks by a few urad.
     lever = to_housing(np.array([-x, -y, 0.0]) * AMPLITUDE**2 / 2 * 0.9 + np.array([0, 0, 9.80665]))
     np.testing.assert_allclose(mean, lever, rtol=0, atol=0.1 * AMPLITUDE**2 / 2 * 0.06 + 0.02)
     # What its axis feels is the third component of what its housing feels.
@@ -78,7 +78,9 @@ def test_asking_changes_no_bit_of_the_truth() -> None:
 
 @pytest.mark.parametrize("mode", ["servo", "ideal", "fixed"])
 def test_cross_rates_include_the_earth(mode):
-    """A level table at rest at angle 0: x and y of the site see the horizontal part of the Earth's rate, z the vertical one."""
+    """A level table at rest at angle 0: x and y of the site see the horizontal part of the Earth's rate, z the vertical
+    one.
+    """
     earth = EarthRate(latitude=np.deg2rad(48.0))
     parameters = TurntableParameters(mode=mode, earth_rate=earth, cogging=())
     table = Turntable(parameters, {"gyro": Mounting()}, exposed=["gyro"])

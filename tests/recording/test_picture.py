@@ -11,8 +11,8 @@ import psutil
 import pytest
 
 from testbed.errors import RunError
-from testbed.palette import COMMANDED, FILTERS, SENSORS, TRUTH, rgb
-from testbed.viewer import headless_viewer, screenshot, settled_picture, show
+from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH, rgb
+from testbed.recording.viewer import headless_viewer, screenshot, settled_picture, show
 
 FAST_HZ = 4900.0  # several periods in each column of pixels of the 0.5 s that are shown
 SIZE = (1600, 900)

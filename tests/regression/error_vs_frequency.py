@@ -1,6 +1,8 @@
-"""Gain, phase and RMSE of every sensor and filter over a small grid of frequencies; run as a program it rewrites the baseline.
+"""Gain, phase and RMSE of every sensor and filter over a small grid of frequencies; run as a program it rewrites the
+baseline.
 
-The baseline is a regression aid and no proof: its numbers come from this code. What they should be is judged elsewhere, against closed forms.
+The baseline is a regression aid and no proof: its numbers come from this code. What they should be is judged elsewhere,
+against closed forms.
 """
 
 from __future__ import annotations

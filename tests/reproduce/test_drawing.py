@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 @pytest.mark.oracle
 def test_running_mean_of_a_sine_is_the_sine_by_the_dirichlet_kernel() -> None:
-    """Mean of n samples of a sine of w per sample: sin(n w / 2) / (n sin(w / 2)), without delay; undefined where it reaches beyond the ends."""
+    """Mean of n samples of a sine of w per sample: sin(n w / 2) / (n sin(w / 2)), without delay; undefined where it
+    reaches beyond the ends.
+    """
     t = np.arange(2000) / 2000.0
     mean, w = smooth(np.sin(2 * np.pi * 10.0 * t), t, 20e-3), 2 * np.pi * 10.0 / 2000.0
     inside = slice(20, -20)

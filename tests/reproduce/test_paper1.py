@@ -10,8 +10,8 @@ import pytest
 
 from testbed.models.motion import MotionProfile
 from testbed.reproduce.paper1 import PAPER, report, table_ii
-from testbed.reproduce.paper1_defects import CASES
-from testbed.reproduce.paper1_runs import (
+from testbed.reproduce.paper1.defects import CASES
+from testbed.reproduce.paper1.runs import (
     BASE_HZ,
     DEG,
     FILTERS,
@@ -39,7 +39,8 @@ def table(path: Path) -> dict[tuple[str, str], dict[str, str]]:
 
 @pytest.mark.slow
 def test_one_parameter_set_meets_table_ii_on_all_four_signals(tmp_path: Path) -> None:
-    """Median over ten seeds at or below the paper's own column, and no seed beyond it by half; `arw_shakf` at or below its targets.
+    """Median over ten seeds at or below the paper's own column, and no seed beyond it by half; `arw_shakf` at or below
+    its targets.
 
     SHAKF tuned at 0.5 Hz meets its own entry there and is at least ten times worse at 4 and 10 Hz.
     """
@@ -101,7 +102,8 @@ def test_one_command_writes_both_tables_and_every_figure_with_its_numbers(tmp_pa
     row = rows["10 Hz", "kalman"]
     for text, bound in zip(line.split()[-2:], ("floor_rmse_deg_s", "optimum_rmse_deg_s"), strict=True):
         assert float(text) == pytest.approx(float(row["rmse_deg_s"]) / float(row[bound]), abs=0.06)
-    # A faster line of the same amplitude costs more; the fast one of the mixed signal is weaker than that at 10 Hz alone.
+    # A faster line of the same amplitude costs more; the fast one of the mixed signal is weaker than that at 10 Hz
+    # alone.
     best = {signal: float(rows[signal, "kalman"]["optimum_rmse_deg_s"]) for signal in SIGNALS}
     assert best["0.5 Hz"] < best["4 Hz"] < best["10 Hz"]
     assert best["0.5 Hz"] < best["mixed"] < best["10 Hz"]

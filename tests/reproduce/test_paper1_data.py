@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.reproduce.paper1_data import (
+from testbed.reproduce.paper1.data import (
     FOLLOWERS,
     PAPER_HEIGHT,
     SWEEP_HZ,
@@ -17,7 +17,7 @@ from testbed.reproduce.paper1_data import (
     slip_error,
     stepped_sine,
 )
-from testbed.reproduce.paper1_runs import BASE_HZ, DEG, SENSORS, Protocol, presets
+from testbed.reproduce.paper1.runs import BASE_HZ, DEG, SENSORS, Protocol, presets
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,9 @@ def points():
 
 @pytest.mark.oracle
 def test_figure_2_is_equation_6() -> None:
-    """Error a / sqrt(w^2 + a^2), a = pi^2 nu / l^2 + sigma B^2 / rho with mercury's handbook values; about 0.1 1/s at 0.036 T (the paper)."""
+    """Error a / sqrt(w^2 + a^2), a = pi^2 nu / l^2 + sigma B^2 / rho with mercury's handbook values; about 0.1 1/s at
+    0.036 T (the paper).
+    """
     table = slip_error()["figure_2"]
     w = 2 * np.pi * table["frequency_hz"]
     for name, field in (("0p036t", 0.036), ("0p1t", 0.1)):
@@ -53,7 +55,8 @@ def test_figure_6_points_lie_on_the_response_and_on_equation_39(points) -> None:
         measured, top = points[name][0], 0.45 * sensor.sample_rate
         seen = np.array([f <= top for f in SWEEP_HZ])
         assert np.isnan(measured[~seen]).all()
-        # The gyro's noise over 2 s: N sqrt(2 / T) = 0.0025 deg/s of 1 deg/s through the same low-pass, three sigma; sx300 meets (39) to 0.2 %.
+        # The gyro's noise over 2 s: N sqrt(2 / T) = 0.0025 deg/s of 1 deg/s through the same low-pass, three sigma;
+        # sx300 meets (39) to 0.2 %.
         assert np.abs(measured / eq39[name] - 1.0)[seen].max() < 0.01
         assert np.abs(measured / sensor.response(SWEEP_HZ) - 1.0)[seen].max() < (2e-3 if name == "mhd_ars" else 8e-3)
         gain = 10.0 ** (tables["figure_6_measured"][f"{name}_gain_db"] / 20.0)
@@ -64,12 +67,15 @@ def test_figure_6_points_lie_on_the_response_and_on_equation_39(points) -> None:
 
 @pytest.mark.oracle
 def test_figure_7_formula_and_measurement_agree(points) -> None:
-    """Without signal: N^2 fs + step^2 / 12 for the MHD ARS; one step of the low-pass, pi times its residue, for the gyro."""
+    """Without signal: N^2 fs + step^2 / 12 for the MHD ARS; one step of the low-pass, pi times its residue, for the
+    gyro.
+    """
     sensors = presets()
     mhd, gyro = (increment_formula(sensors[name], np.array([1.0]), 0.0)[0] for name in ("mhd_ars", "mems_gyro"))
     step = 20.0 / 2**18 / (1.0 / 3.0)  # deg/s per count of 18 bit over +-10 V at 333 mV/(deg/s)
     assert mhd / DEG**2 == pytest.approx((1e-7 / DEG) ** 2 * 20_000.0 + step**2 / 12.0, rel=2e-3, abs=0.0)
-    # G -> b/s, b = 154.537/5.2175: white noise N integrated over one period T leaves N^2 b^2 T / 2; rolls off at 4.5 Hz, off by b T.
+    # G -> b/s, b = 154.537/5.2175: white noise N integrated over one period T leaves N^2 b^2 T / 2; rolls off at 4.5
+    # Hz, off by b T.
     b = 154.537 / 5.2175
     assert gyro / DEG**2 == pytest.approx(0.0025**2 * b**2 / 2000.0 / 2.0, rel=0.04, abs=0.0)
     tables = increments(points)
@@ -77,7 +83,8 @@ def test_figure_7_formula_and_measurement_agree(points) -> None:
         column = f"{name}_deg2_s2"
         freq, level = tables["figure_7_measured"]["frequency_hz"], tables["figure_7_measured"][column]
         formula = np.interp(np.log(freq), np.log(tables["figure_7"]["frequency_hz"]), tables["figure_7"][column])
-        # Relative spread of a mean square of n readings, correlated over at most two: sqrt(4 / n), n >= 4000; the interpolation adds 0.1 %.
+        # Relative spread of a mean square of n readings, correlated over at most two: sqrt(4 / n), n >= 4000; the
+        # interpolation adds 0.1 %.
         assert np.abs(level / formula - 1.0).max() < 3.5 * np.sqrt(4.0 / 4000.0)
         assert freq[-1] == 25.0
     # "At its noise floor below about 1.5 Hz: +0.04 % at 0.5 Hz, +44 % at 4 Hz."

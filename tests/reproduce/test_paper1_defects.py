@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.reproduce.paper1_defects import CASES, Split, sensors_of, split
-from testbed.reproduce.paper1_runs import BASE_HZ, DEG, Protocol
+from testbed.reproduce.paper1.defects import CASES, Split, sensors_of, split
+from testbed.reproduce.paper1.runs import BASE_HZ, DEG, Protocol
 
 PROTOCOL = Protocol(duration=8.0, settle=6.0)
 
@@ -16,7 +16,9 @@ def sine(freq_hz: float) -> np.ndarray:
 
 
 def test_the_cases_are_what_they_say() -> None:
-    """1 % and 0.5 ms in the sensors' own responses; the 1/f part equal to the white one at its knee; clean sensors have neither."""
+    """1 % and 0.5 ms in the sensors' own responses; the 1/f part equal to the white one at its knee; clean sensors have
+    neither.
+    """
     freq = np.array([10.0])
     clean, late = sensors_of("clean"), np.exp(-2j * np.pi * 10.0 * 0.5e-3)
     for case, name, factor in (
@@ -43,7 +45,9 @@ def test_the_cases_are_what_they_say() -> None:
 
 @pytest.mark.oracle
 def test_at_10_hz_the_mhd_sensors_defect_forces_its_own_error() -> None:
-    """There the filter takes the rate from the MHD ARS, G d over its belief G: A |d - 1| / sqrt(2), and noise adds by squares."""
+    """There the filter takes the rate from the MHD ARS, G d over its belief G: A |d - 1| / sqrt(2), and noise adds by
+    squares.
+    """
     rate = sine(10.0)
     clean = split(rate, "10 Hz", "clean", 2, PROTOCOL)
     for case, defect in (("gain +1 % (MHD)", 1.01), ("delay 0.5 ms (MHD)", np.exp(-2j * np.pi * 10.0 * 0.5e-3))):
@@ -59,7 +63,8 @@ def test_at_10_hz_the_mhd_sensors_defect_forces_its_own_error() -> None:
                     strict=True,
                 )
             )
-            # Over 2 s the slow part of either (crossover below 0.1 Hz) is a single draw, so that they are correlated by chance.
+            # Over 2 s the slow part of either (crossover below 0.1 Hz) is a single draw, so that they are correlated by
+            # chance.
             assert row["closure"] == pytest.approx(1.0, abs=0.1)
             assert row["lowest"] <= row["rmse"] <= row["highest"]
         # A filter that does not adapt answers to the noise alike, whatever the belief: linear, but for the rounding.

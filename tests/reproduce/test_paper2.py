@@ -11,8 +11,9 @@ import pytest
 from scipy.linalg import solve_discrete_are
 from typer.testing import CliRunner
 
-from testbed.cli import app
+from testbed.cli.app import app
 from testbed.errors import ScenarioError
+from testbed.metrics.spectra import WelchDensity
 from testbed.reproduce import PAPERS, SEEDS, run_paper
 from testbed.reproduce.paper2 import (
     CHANNELS,
@@ -27,7 +28,6 @@ from testbed.reproduce.paper2 import (
     switched_on,
 )
 from testbed.sensors import load_preset
-from testbed.spectra import WelchDensity
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,7 +89,9 @@ def test_tables_are_written_and_meet_the_targets(tmp_path: Path) -> None:
 
 
 def test_the_claims_are_those_of_the_measured_arrays() -> None:
-    """Ripple 0.02 / 1.01; the low band is what is below 1 Hz; linearity from 2 Hz on; noise against the input-referred MHD ARS, from its corner on."""
+    """Ripple 0.02 / 1.01; the low band is what is below 1 Hz; linearity from 2 Hz on; noise against the input-referred
+    MHD ARS, from its corner on.
+    """
     protocol = replace(FEW, scale_frequencies=(0.1, 10.0), linear_frequencies=(0.2, 2.0))
     linear = np.array([[9.0, 9.0, 9.0], [3.0, 2.0, 1.0]])
     freq, density = (
@@ -154,9 +156,11 @@ def settled_filter() -> tuple[Any, FloatArray, FloatArray]:
 
 
 def shares(freq: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what the noise of gyro and MHD ARS leaves in the settled fused rate over the MHD ARS's own, referred to the rate [-].
+    """Return what the noise of gyro and MHD ARS leaves in the settled fused rate over the MHD ARS's own, referred to
+    the rate [-].
 
-    Gyro: 0.8 deg/sqrt(h) before its low-pass; MHD ARS: 100 nrad/s/sqrt(Hz) on the reading, so its own is that over |H|^2.
+    Gyro: 0.8 deg/sqrt(h) before its low-pass; MHD ARS: 100 nrad/s/sqrt(Hz) on the reading, so its own is that over
+    |H|^2.
     """
     stage, A, K = settled_filter()
     z = np.exp(2j * np.pi * freq / CLOCK_HZ)
@@ -175,10 +179,11 @@ def test_settled_noise_is_within_a_decibel_of_the_mhd_ars() -> None:
 
 
 def test_measured_noise_is_within_a_decibel_of_the_mhd_ars() -> None:
-    """60 s at standstill from a settled start. Fused and MHD ARS share the noise of the latter, so their ratio scatters by the gyro's only.
+    """60 s at standstill from a settled start. Fused and MHD ARS share the noise of the latter, so their ratio scatters
+    by the gyro's only.
 
-    With its share g of the power and m independent ordinates the mean of |a + b|^2 / |a|^2 has a standard error of sqrt(2 g + g^2) / sqrt(m);
-    three of them are allowed, on top of the decibel.
+    With its share g of the power and m independent ordinates the mean of |a + b|^2 / |a|^2 has a standard error of
+    sqrt(2 g + g^2) / sqrt(m); three of them are allowed, on top of the decibel.
     """
     corner = cast("MhdArs", load_preset("mhd03")).channel.corner_freq_hz
     stage, *_ = settled_filter()
@@ -201,7 +206,8 @@ def test_measured_noise_is_within_a_decibel_of_the_mhd_ars() -> None:
 def test_no_fused_rate_is_less_noisy_at_a_judged_line_than_the_mhd_ars() -> None:
     """Linearity "no worse" cannot be had to the letter.
 
-    With G from the gyro and (1 - G)/H from the MHD ARS, which any flat scale factor asks for, the noise over the MHD ARS's is
+    With G from the gyro and (1 - G)/H from the MHD ARS, which any flat scale factor asks for, the noise over the MHD
+    ARS's is
     |1 - G|^2 + |G|^2 S_gyro/S_mhd. Its least value over all G is 1/(1 + S_mhd/S_gyro), and for the first-order handover G = 1/(1 + jf/f_c) it is above 1 for every f_c, since Re G = |G|^2.
     """
     f = 2.0

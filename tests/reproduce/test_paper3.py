@@ -64,7 +64,9 @@ def test_the_honest_rows_never_see_the_record_that_they_are_judged_on(monkeypatc
 
 @pytest.mark.slow
 def test_the_original_has_the_coefficients_that_were_put_in(written):
-    """N and B of the preset; a day at 0.1 Hz tells them to some 5 and 10 %, and confused they would be off by twenty times."""
+    """N and B of the preset; a day at 0.1 Hz tells them to some 5 and 10 %, and confused they would be off by twenty
+    times.
+    """
     _, _, rows = written
     assert float(rows["original", "-"]["angle_random_walk_deg_sqrt_h"]) == pytest.approx(7.8034e-4, rel=0.2, abs=0.0)
     assert float(rows["original", "-"]["bias_instability_deg_h"]) == pytest.approx(1.5323e-2, rel=0.2, abs=0.0)
@@ -110,7 +112,9 @@ def test_the_page_has_the_numbers_of_the_table(written):
 
 
 def test_a_cycle_has_the_drift_of_the_paper_and_the_earth_on_top():
-    """Noise-free closed form: the mean of the reading is Earth rate plus mean drift, but for noise and scale factor by temperature."""
+    """Noise-free closed form: the mean of the reading is Earth rate plus mean drift, but for noise and scale factor by
+    temperature.
+    """
     thermal = paper3.cycle("paper", 3, 0.1)
     assert thermal.record.rate.size == 8520
     assert thermal.drift.std() == pytest.approx(np.radians(0.096) / 3600.0, rel=0.02, abs=0.0)

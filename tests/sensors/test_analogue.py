@@ -103,8 +103,8 @@ def test_whole_delays_are_exact(whole: int) -> None:
 @pytest.mark.parametrize("freq", [10.0, 300.0, 1000.0])
 def test_fractional_delay_meets_its_response(samples: float, freq: float) -> None:
     part = Delay(time=samples / FS)
-    # Cubic through four points: |D (D-1) (D-2) (D-3)| / 24 (2 pi f T)^4, at most 1/24, and 9/16 of that where the instant
-    # lies between the inner two; the next order is 20 % of it at 1 kHz.
+    # Cubic through four points: |D (D-1) (D-2) (D-3)| / 24 (2 pi f T)^4, at most 1/24, and 9/16 of that where the
+    # instant lies between the inner two; the next order is 20 % of it at 1 kHz.
     centred = 1.0 if samples < 1.0 else 9.0 / 16.0
     bound = 1.2 * centred / 24.0 * (2 * np.pi * freq / FS) ** 4 + 1e-9
     expected = np.exp(-2j * np.pi * freq * samples / FS)

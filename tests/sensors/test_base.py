@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from testbed.errors import UnknownNameError
-from testbed.models.turntable_parameters import Mounting
+from testbed.models.turntable.parameters import Mounting
 from testbed.parts import preset_names
 from testbed.sensors import SENSORS, load_preset
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio

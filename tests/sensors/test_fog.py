@@ -1,4 +1,6 @@
-"""The fibre-optic gyro: each noise term alone, scale factor and bias by temperature, mean over the interval, thermometer."""
+"""The fibre-optic gyro: each noise term alone, scale factor and bias by temperature, mean over the interval,
+thermometer.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from testbed.allan import allan_deviation, fit_allan
 from testbed.sensors import load_preset
-from testbed.sensors.allan import allan_deviation, fit_allan
 from testbed.sensors.base import Surroundings, ThermalStage
 from testbed.sensors.fog import Fog, IntervalMean
 from testbed.sensors.noise_terms import NoiseStage
@@ -71,7 +73,8 @@ def test_bias_instability_alone_is_flat():
 
 @pytest.mark.oracle
 def test_all_terms_are_identified_at_100_hz_and_q_is_not_at_1_hz():
-    """Where sqrt(3) Q / tau meets N / sqrt(tau) is tau = 3 Q^2 / N^2 = 0.5 ms: at 1 Hz nothing of Q is left, at 100 Hz a trace.
+    """Where sqrt(3) Q / tau meets N / sqrt(tau) is tau = 3 Q^2 / N^2 = 0.5 ms: at 1 Hz nothing of Q is left, at 100 Hz
+    a trace.
 
     With N out of the way Q is found to a percent.
     """
@@ -179,10 +182,12 @@ def test_a_step_of_temperature_in_degc_is_refused():
 @pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(6))
 def test_a_weighted_fit_finds_the_papers_coefficients_in_a_day_of_noise(seed):
-    """85,200 readings at 1 Hz: N within 2.5 %, B within 6 %, and Q, which would cross N at 0.5 ms, only as an upper limit.
+    """85,200 readings at 1 Hz: N within 2.5 %, B within 6 %, and Q, which would cross N at 0.5 ms, only as an upper
+    limit.
 
-    The density is known from 0.5 Hz to 1/day. The intervals of the fit, tested for coverage elsewhere, say what a seed may do: half of one is
-    1.96 standard deviations, so a bound is at least 2.6 of them: of six seeds and two coefficients one in nine trials would miss by chance.
+    The density is known from 0.5 Hz to 1/day. The intervals of the fit, tested for coverage elsewhere, say what a seed
+    may do: half of one is 1.96 standard deviations, so a bound is at least 2.6 of them: of six seeds and two
+    coefficients one in nine trials would miss by chance.
     """
     fit = fitted_noise(1.0, 85_200, seed)
     for found, true, bound in (

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from testbed.allan import allan_deviation
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset, mems_gyro, noise
-from testbed.sensors.allan import allan_deviation
 from testbed.sensors.base import Surroundings
 from testbed.sensors.gyro_errors import Fir
 from testbed.sensors.mems_gyro import MemsGyro
@@ -185,14 +185,17 @@ def test_a_ramp_lags_by_slope_times_delay(errors: dict[str, Any], delay: float) 
 @pytest.mark.oracle
 @pytest.mark.parametrize("spread", [1e-6, 2e-5, 5e-4])
 def test_jitter_on_a_slope_has_its_standard_deviation(spread: float) -> None:
-    """Ages uniform from 0 to J: rate slope times J / sqrt(12) rms about slope times J / 2, whatever lies between samples."""
+    """Ages uniform from 0 to J: rate slope times J / sqrt(12) rms about slope times J / 2, whatever lies between
+    samples.
+    """
     slope, t = 2.0, times(4.0)
     readings = noisy(jitter=spread).sample(slope * t, FS)
     age = (t[::10] - readings / slope)[10:]
     # Rounded to a count of 1e-8 rad/s: 2.5e-9 s of age at most.
     assert age.min() > -3e-9
     assert age.max() < spread + 3e-9
-    # 7990 uniform values: mean within 5 J / sqrt(12 n); kurtosis 1.8, so the standard deviation within 5 sqrt(0.8 / 4n).
+    # 7990 uniform values: mean within 5 J / sqrt(12 n); kurtosis 1.8, so the standard deviation within 5 sqrt(0.8 /
+    # 4n).
     assert age.mean() == pytest.approx(0.5 * spread, abs=5.0 * spread / math.sqrt(12.0 * age.size))
     assert age.std() == pytest.approx(spread / math.sqrt(12.0), rel=5.0 * math.sqrt(0.2 / age.size))
 
@@ -356,7 +359,9 @@ def test_markov_bias_peaks_as_known() -> None:
 
 @pytest.mark.oracle
 def test_datasheet_converts_exactly() -> None:
-    """0.15 deg/sqrt(h) = 0.0025 deg/s/sqrt(Hz) two-sided = 0.0025 sqrt(2) one-sided; 2.7 deg/h has a floor of 1.793 deg/h."""
+    """0.15 deg/sqrt(h) = 0.0025 deg/s/sqrt(Hz) two-sided = 0.0025 sqrt(2) one-sided; 2.7 deg/h has a floor of 1.793
+    deg/h.
+    """
     rows = dict(load_preset("adis16505").datasheet())
     assert rows["angle random walk N"] == "0.15 deg/sqrt(h)"
     assert rows["N as root density, two-sided"] == "0.0025 deg/s/sqrt(Hz)"

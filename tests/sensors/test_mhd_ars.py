@@ -7,8 +7,8 @@ import pytest
 from pydantic import ValidationError
 from scipy.optimize import brentq
 
-from testbed.models.channel_ring import ChannelRing
-from testbed.models.thermal_drift import REFERENCE
+from testbed.models.mhd_channel.ring import ChannelRing
+from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors import load_preset
 from testbed.sensors.analogue import OnePole
 from testbed.sensors.mhd_ars import MhdArs
@@ -213,8 +213,8 @@ def test_equipped_sensor_without_noise_equals_its_response(freq: float) -> None:
     t = np.arange(int((seconds + wait) * FS)) / FS
     readings = sensor.sample(0.1 * np.sin(2 * np.pi * freq * t), FS)
     got = 20j * np.mean((readings * np.exp(-2j * np.pi * freq * t))[t >= wait])
-    # Fourth-order terms of two low-passes and the delay, (19/720 + 19/720 + 1/24) (2 pi f T)^4 and half as much again; the
-    # transformer's start, 2 1/s, is down to e^-16.
+    # Fourth-order terms of two low-passes and the delay, (19/720 + 19/720 + 1/24) (2 pi f T)^4 and half as much again;
+    # the transformer's start, 2 1/s, is down to e^-16.
     bound = 1.5 * 0.095 * (2 * np.pi * freq / FS) ** 4 + 2e-6
     assert got == pytest.approx(sensor.response(np.array([freq]))[0], abs=bound)
 
@@ -243,7 +243,8 @@ def test_a_weaker_magnet_shows_in_the_readings() -> None:
     plain = sx300()
     magnet = plain.channel.model_copy(update={"field_drift": -1.1e-3})
     warm = plain.model_copy(update={"channel": magnet, "temperature": REFERENCE + 20.0})
-    # Far above the corner the braking does not matter (a/w = 0.5 % at 500 Hz, 4 % less of it), so the EMF alone is left.
+    # Far above the corner the braking does not matter (a/w = 0.5 % at 500 Hz, 4 % less of it), so the EMF alone is
+    # left.
     ratio = warm.response(np.array([500.0])) / plain.response(np.array([500.0]))
     assert abs(ratio[0]) == pytest.approx(np.exp(-0.022), rel=5e-4)
 

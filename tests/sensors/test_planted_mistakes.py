@@ -2,16 +2,18 @@
 
 A check that passes on the mistake would be no check. The defects are published ones; their plants and checks below:
 
-======================================  ===============================================  ================================
-where                                   defect                                           check that fails on it
-======================================  ===============================================  ================================
-NaveGo                                  rate random walk in steps of K dt                check_rate_random_walk
-RocketPy                                precedence makes the random walk white           check_rate_random_walk
-RocketPy                                unit in prose only                               check_units
-gnss-ins-sim                            input density changed in place                   check_inputs_unchanged
-gnss-ins-sim                            noise repeats every 16384 samples                check_no_period
-gnss-ins-sim                            custom profile overwrites the built-in one       check_presets_apart
-Basilisk                                noise per step, so it depends on the task rate   check_angle_random_walk,
+======================================  ===============================================
+================================ where                                   defect
+check that fails on it
+======================================  ===============================================
+================================ NaveGo                                  rate random walk in steps of K dt
+check_rate_random_walk RocketPy                                precedence makes the random walk white
+check_rate_random_walk RocketPy                                unit in prose only
+check_units gnss-ins-sim                            input density changed in place
+check_inputs_unchanged gnss-ins-sim                            noise repeats every 16384 samples
+check_no_period gnss-ins-sim                            custom profile overwrites the built-in one
+check_presets_apart Basilisk                                noise per step, so it depends on the task rate
+check_angle_random_walk,
                                                                                          check_rate_of_the_task
 Basilisk                                two instruments share a seed                     check_streams, check_axes
 Pegasus, PX4, RotorS, S2E, Elodin       wrong time constant                              check_markov
@@ -24,7 +26,8 @@ Isaac Lab, Gazebo                       wrong dt: sensor rate is not the physics
                                                                                          check_rate_of_the_task
 Isaac Lab, Gazebo                       every n-th value taken without a filter          check_aliasing
 MuJoCo sysid.apply_delay                writes into its input                            check_inputs_unchanged
-======================================  ===============================================  ================================
+======================================  ===============================================
+================================
 """
 
 from __future__ import annotations
@@ -40,9 +43,10 @@ from pydantic import ConfigDict, ValidationError
 from scipy import stats
 
 from testbed import sensors, units
-from testbed.sensors import allan, base, load_preset, mems_gyro, noise, noise_terms
-from testbed.sensors.allan import allan_deviation
-from testbed.sensors.allan_freedom import equivalent_freedom
+from testbed.allan import allan_deviation
+from testbed.allan import curve as allan
+from testbed.allan.freedom import equivalent_freedom
+from testbed.sensors import base, load_preset, mems_gyro, noise, noise_terms
 from testbed.signals import LinearFilter, random_stream
 
 if TYPE_CHECKING:

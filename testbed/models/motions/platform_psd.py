@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.realisation import gaussian_rate
+from testbed.models.turntable.realisation import gaussian_rate
 from testbed.parts import Part
 from testbed.units import Frequency, Quantity
 
@@ -43,8 +43,9 @@ class PlatformPsd(Motion):
 
     With `points` the density is a power law between neighbours, straight in log-log,
     :math:`S(f) = S_i (f/f_i)^{\ln(S_{i+1}/S_i) / \ln(f_{i+1}/f_i)}`, in the band from the first to the last. With
-    `spectrum` olympus it is :math:`S(f) = (2\pi f)^2 \cdot \tfrac12 \cdot 160\,\mu rad^2/Hz / (1 + (f/1\,Hz)^2)` from `low` to `high`. One
-    realisation of `testbed.models.realisation.gaussian_rate`; the variance is twice the integral of S over the band.
+    `spectrum` olympus it is :math:`S(f) = (2\pi f)^2 \cdot \tfrac12 \cdot 160\,\mu rad^2/Hz / (1 + (f/1\,Hz)^2)` from
+    `low` to `high`. One realisation of `testbed.models.turntable.realisation.gaussian_rate`; the variance is twice the
+    integral of S over the band.
 
     Parameters
     ----------

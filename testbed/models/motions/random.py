@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.realisation import gaussian_rate
+from testbed.models.turntable.realisation import gaussian_rate
 from testbed.units import Frequency, RatePsd
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Random(Motion):
     r"""Gaussian random rate with the constant two-sided density `psd` for `low` <= |f| <= `high` and nothing outside.
 
-    One realisation of `testbed.models.realisation.gaussian_rate`; the variance is 2 S (high - low).
+    One realisation of `testbed.models.turntable.realisation.gaussian_rate`; the variance is 2 S (high - low).
 
     Parameters
     ----------

@@ -115,7 +115,10 @@ class Recorded(Motion):
         if uneven.size:
             i = int(uneven[0])
             self._refuse(
-                f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is {step:g} s; resample the record",
+                (
+                    f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is "
+                    f"{step:g} s; resample the record"
+                ),
                 lines[i + 1],
             )
         return t, rate

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 class Sine(Motion):
     r"""Sine of one frequency; the quantity that is given follows sin(2 pi f t + phase).
 
-    With `rate` a: :math:`\dot\theta = a \sin(2\pi f t + \varphi)`. With `angle` b: :math:`\theta = b \sin(2\pi f t + \varphi)`, so
+    With `rate` a: :math:`\dot\theta = a \sin(2\pi f t + \varphi)`. With `angle` b: :math:`\theta = b \sin(2\pi f t +
+    \varphi)`, so
     :math:`\dot\theta = 2\pi f b \cos(2\pi f t + \varphi)`.
 
     Parameters

@@ -55,7 +55,8 @@ def test_multisine_has_its_lines_and_a_low_crest_factor():
     spectrum = np.abs(np.fft.rfft(rate)) / (t.size / 2)
     assert_allclose(spectrum[2 * np.arange(1, 33)], 0.1, rtol=1e-10)
     assert motion.lines() == frequencies
-    # Schroeder (1970) promises a peak of about 1.7 rms for a flat spectrum; all phases zero would give sqrt(2 * 32) = 8.
+    # Schroeder (1970) promises a peak of about 1.7 rms for a flat spectrum; all phases zero would give sqrt(2 * 32) =
+    # 8.
     assert np.max(np.abs(rate)) / np.sqrt(np.mean(rate**2)) < 2.2
 
 
@@ -108,7 +109,8 @@ def test_random_has_the_stated_two_sided_density_and_nothing_outside():
     rate = rate_of(Random(psd=psd, low=low, high=high), duration)(t)
     freq, one_sided = periodogram(rate, fs, window="hann", detrend=False, return_onesided=True)
     inside = (freq > low + 0.1) & (freq < high - 0.1)
-    # n independent periodogram bins of a Gaussian process have a relative spread of 1/sqrt(n); the hann window correlates neighbours (factor 2).
+    # n independent periodogram bins of a Gaussian process have a relative spread of 1/sqrt(n); the hann window
+    # correlates neighbours (factor 2).
     spread = np.sqrt(2.0 / np.count_nonzero(inside))
     assert np.mean(one_sided[inside]) / 2.0 == pytest.approx(psd, rel=4 * spread)
     outside = (freq > high + 0.5) | ((freq < low - 0.5) & (freq > 0))

@@ -1,0 +1,96 @@
+"""Overlapping Allan deviation of a rate record with confidence limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.allan.freedom import chi_square_limits, equivalent_freedom, record_exponent
+from testbed.allan.types import AllanCurve
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from testbed.signals import FloatArray
+
+_PER_DECADE = 10
+
+
+def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | None = None) -> AllanCurve:
+    r"""Return the overlapping Allan deviation.
+
+    .. math:: \sigma^2(mT) = \frac{1}{2 (mT)^2 (n - 2m + 1)} \sum_k (\theta_{k+2m} - 2\theta_{k+m} + \theta_k)^2
+
+    Parameters
+    ----------
+    rate : array_like, shape (n_time,)
+        Rate [rad/s] (any unit: the deviation has the same).
+    sample_rate_hz : float
+        Sample rate [Hz].
+    tau : array_like, shape (n_tau,), optional
+        Averaging times [s], rounded to whole samples; ten per decade up to a quarter of the record if left out.
+
+    Returns
+    -------
+    AllanCurve
+        Deviation with 95 % limits from equivalent degrees of freedom, the type of noise from the lag-one
+        autocorrelation.
+
+    Raises
+    ------
+    ValueError
+        If the record is no finite vector of at least 4 samples, or a tau is under one sample or over half the record.
+
+    References
+    ----------
+    Riley, "Handbook of Frequency Stability Analysis", NIST SP 1065 (2008);
+    Greenhall and Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003.
+    """
+    record = _checked(rate, sample_rate_hz)
+    n_time = record.size
+    m = _default_factors(n_time) if tau is None else _factors(tau, sample_rate_hz, n_time)
+    # The mean drops out of second differences; without it the sum keeps its digits.
+    angle = np.concatenate([[0.0], np.cumsum(record - record.mean())])
+    variance = np.array([_variance(angle, int(k)) for k in m])
+    exponents = [record_exponent(angle, int(k)) for k in m]
+    edf = np.array([equivalent_freedom(int(k), n_time + 1, int(a)) for k, a in zip(m, exponents, strict=True)])
+    low, high = chi_square_limits(variance, edf)
+    return AllanCurve(m / sample_rate_hz, np.sqrt(variance), np.sqrt(low), np.sqrt(high), edf, n_time, sample_rate_hz)
+
+
+def _checked(rate: ArrayLike, sample_rate_hz: float) -> FloatArray:
+    record: FloatArray = np.asarray(rate, dtype=np.float64)
+    if record.ndim != 1 or record.size < 4:
+        msg = f"rate: expected a vector of at least 4 samples, got shape {record.shape}"
+        raise ValueError(msg)
+    if not np.isfinite(record).all():
+        first = int(np.argmin(np.isfinite(record)))
+        msg = f"rate: expected finite samples, got {record[first]} at sample {first}"
+        raise ValueError(msg)
+    if not (sample_rate_hz > 0.0 and np.isfinite(sample_rate_hz)):
+        msg = f"sample_rate_hz: expected a positive number, got {sample_rate_hz}"
+        raise ValueError(msg)
+    return record
+
+
+def _default_factors(n_time: int) -> FloatArray:
+    longest = n_time // 4
+    count = 1 + int(np.ceil(_PER_DECADE * np.log10(longest)))
+    factors: FloatArray = np.unique(np.round(np.geomspace(1, longest, count)))
+    return factors
+
+
+def _factors(tau: ArrayLike, sample_rate_hz: float, n_time: int) -> FloatArray:
+    m: FloatArray = np.unique(np.round(np.atleast_1d(np.asarray(tau, dtype=np.float64)) * sample_rate_hz))
+    if not (m.size and m[0] >= 1 and m[-1] <= n_time // 2):
+        longest = n_time // 2 / sample_rate_hz
+        msg = f"tau: expected {1 / sample_rate_hz:g} to {longest:g} s, got {np.asarray(tau).tolist()}"
+        raise ValueError(msg)
+    return m
+
+
+def _variance(angle: FloatArray, m: int) -> float:
+    first = angle[m:] - angle[:-m]
+    second = first[m:] - first[:-m]
+    return float(np.dot(second, second) / (2.0 * m**2 * second.size))

@@ -1,0 +1,1 @@
+"""The chain that joins motion, turntable, sensors and fusion, and the runs that are made with it."""

@@ -1,0 +1,218 @@
+"""Drift compensation from files to files: what `testbed compensate` does."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.compensation import PAPER, paper3
+from testbed.compensation.model_only import METHODS, DriftModel, train
+from testbed.drift.leak import audit
+from testbed.drift.page import Audited, write_audit
+from testbed.drift.records import Columns, ThermalRecord, check_options, read
+from testbed.errors import Problem, ScenarioError, UnknownNameError
+from testbed.runs.folder import failing_as_run_error, write_text
+from testbed.units import DEG_H
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from testbed.compensation.record import Record
+    from testbed.signals import FloatArray
+
+# A rate taken for a temperature moves by less, and so does an oven that was not switched on.
+LEAST_SPAN = 1.0  # K
+
+
+def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Path) -> Iterator[str]:
+    """Train a model on thermal cycles, write it, and yield the lines to print.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        Run folders or text files.
+    columns : Columns
+        How to read them.
+    method : str
+        Kind of regression.
+    out : Path
+        Model file (JSON).
+
+    Yields
+    ------
+    str
+        One line.
+
+    Raises
+    ------
+    ScenarioError
+        If a source cannot be read, the method is unknown or the cycles do not fit together.
+    """
+    if method not in METHODS:
+        raise ScenarioError([Problem(str(UnknownNameError("method", method, METHODS)), key="--method")])
+    check_options(sources, columns)
+    _check_file(out)
+    cycles: list[ThermalRecord] = []
+    for source in sources:
+        cycle = read(source, columns)
+        _check_cycle(source, cycle, cycles)
+        cycles.append(cycle)
+        yield f"cycle: {cycle}"
+    yield f"training {method} ..."
+    try:
+        model = train([cycle.record for cycle in cycles], method=method)
+    except ValueError as error:
+        raise ScenarioError([Problem(str(error), file=", ".join(map(str, sources)))]) from error
+    document = {**model.to_dict(), "trained_on": {cycle.fingerprint: cycle.name for cycle in cycles}}
+    with failing_as_run_error(str(out)):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_text(out, json.dumps(document, allow_nan=False) + "\n")
+    yield (
+        f"method {method}; error of the cross-validation {model.blocked_error / DEG_H:.4g} deg/h, noise of the "
+        f"means included"
+    )
+    yield f"written: {out}"
+
+
+def _check_cycle(source: Path, cycle: ThermalRecord, before: Sequence[ThermalRecord]) -> None:
+    """Refuse a cycle without heat, and one that was there before."""
+    span = float(np.ptp(cycle.record.temperature))
+    if span < LEAST_SPAN:
+        msg = f"expected a temperature that moves by at least {LEAST_SPAN:g} K, got {span:.3g} K; name its column"
+        raise ScenarioError([Problem(msg, key="--temperature", file=str(source))])
+    if cycle.fingerprint in {other.fingerprint for other in before}:
+        raise ScenarioError([Problem("expected different cycles, got this one twice", file=str(source))])
+
+
+def _check_file(out: Path) -> None:
+    if out.is_dir():
+        raise ScenarioError([Problem("expected a file to write, got a folder", key="--out", file=str(out))])
+
+
+def read_model(path: Path) -> DriftModel:
+    """Return the model that `train_model` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        Model file.
+
+    Raises
+    ------
+    ScenarioError
+        If it is none.
+    """
+    return _read_document(path)[0]
+
+
+def _read_document(path: Path) -> tuple[DriftModel, dict[str, str]]:
+    """Return a model, and the names of the cycles that it was trained on by their fingerprints."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        model = DriftModel.from_dict(document if isinstance(document, dict) else {})
+        return model, dict(document.get("trained_on", {}))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        msg = f"expected a model that `testbed compensate train` wrote: {reason}"
+        raise ScenarioError([Problem(msg, file=str(path))]) from error
+
+
+def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterator[str]:
+    """Compensate a record, write it as a text file, and yield the lines to print.
+
+    Parameters
+    ----------
+    path : Path
+        Model file.
+    source : Path
+        Run folder or text file.
+    columns : Columns
+        How to read it.
+    out : Path
+        Text file to write: time [s], compensated rate and drift [deg/h], and whether the temperature was outside the
+        trained range.
+
+    Yields
+    ------
+    str
+        One line.
+
+    Raises
+    ------
+    ScenarioError
+        If model or record cannot be read.
+    """
+    check_options([source], columns)
+    _check_file(out)
+    model, thermal = read_model(path), read(source, columns)
+    yield f"record: {thermal}"
+    block = model.apply(thermal.record)
+    t = np.arange(block.rate.size) / thermal.record.sample_rate_hz
+    rows = zip(t, block.rate / DEG_H, block.drift / DEG_H, block.extrapolated, strict=True)
+    lines = [f"{time:.9g},{rate:.9g},{drift:.9g},{outside:d}" for time, rate, drift, outside in rows]
+    with failing_as_run_error(str(out)):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
+    yield f"{block.extrapolated.mean():.2%} of the samples outside the trained range"
+    yield f"written: {out}"
+
+
+def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> Audited:
+    """Audit a compensation on a record and write the folder of the audit.
+
+    Parameters
+    ----------
+    model : str
+        Model file, or `PAPER` for the paper's own protocol, which trains on the record that it corrects.
+    source : Path
+        Run folder or text file.
+    columns : Columns
+        How to read it.
+    out : Path
+        Folder.
+    tell : callable
+        Is told what is being done.
+
+    Raises
+    ------
+    ScenarioError
+        If model or record cannot be read, or the record is too short.
+    """
+    check_options([source], columns)
+    if out.exists() and not out.is_dir():
+        raise ScenarioError([Problem("expected a folder to write, got a file", key="--out", file=str(out))])
+    trained = None if model == PAPER else _read_document(Path(model))
+    thermal = read(source, columns)
+    tell(f"compensating {thermal}")
+    try:
+        audited = (
+            _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
+        )
+    except ValueError as error:
+        raise ScenarioError([Problem(str(error), file=str(source))]) from error
+    with failing_as_run_error(str(out)):
+        write_audit(audited, out)
+    return audited
+
+
+def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
+    def compensate(record: Record) -> FloatArray:
+        return paper3.compensate(record).rate
+
+    compensated = compensate(thermal.record)
+    found = audit(compensate, thermal.record, compensated, thermal.drift, tell)
+    return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
+
+
+def _audit_trained(
+    path: Path, model: DriftModel, trained_on: dict[str, str], thermal: ThermalRecord, tell: Callable[[str], None]
+) -> Audited:
+    block = model.apply(thermal.record)
+    found = audit(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
+    found = replace(found, seen=thermal.fingerprint in trained_on)
+    name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
+    return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))

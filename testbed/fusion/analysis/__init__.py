@@ -1,0 +1,1 @@
+"""Mathematics about filters and sensors: identification, optimum, divergence, frequency."""

@@ -1,0 +1,214 @@
+"""Beliefs from measurements: the response to a sine, and a transfer function of given order fitted to responses by
+least squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.fusion.belief import SensorBelief
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from testbed.signals import ComplexArray, FloatArray
+
+_ROUNDS = 200
+# Parts of the band (in logarithm) over which the poles are spread at the start: a search can end in a local minimum.
+_SPREADS = ((0.0, 1.0), (0.5, 1.0), (0.0, 0.5))
+# Half the sum of squares that is rounding only.
+_EXACT = 1e-20
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A fitted transfer function and what it leaves.
+
+    Parameters
+    ----------
+    numerator, denominator : ndarray, shapes (n_zero + 1,), (n_pole + 1,)
+        Coefficients in s [rad/s], highest power first; the denominator starts with 1.
+    worst : float
+        Largest |fit / measured - 1| over the frequencies of the fit [-].
+    """
+
+    numerator: FloatArray
+    denominator: FloatArray
+    worst: float
+
+    def belief(self, *, input_noise: float = 0.0, output_noise: float = 0.0) -> SensorBelief:
+        """Return it as a belief.
+
+        Parameters
+        ----------
+        input_noise, output_noise : float, optional
+            Two-sided root densities before and behind the dynamics [rad/sqrt(s)].
+        """
+        return SensorBelief(
+            numerator=tuple(self.numerator.tolist()),
+            denominator=tuple(self.denominator.tolist()),
+            input_noise=input_noise,
+            output_noise=output_noise,
+        )
+
+
+def sine_response(
+    reading: ArrayLike, sample_rate_hz: float, freq_hz: float, amplitude: float, *, settle: float = 0.0
+) -> complex:
+    r"""Return the frequency response at one point of a stepped-sine sweep: gain and phase of a sensor shaken by A sin(2
+    pi f t).
+
+    .. math:: \min \sum_k (z_k - c_0 - c_1 t_k - a \sin 2 \pi f t_k - b \cos 2 \pi f t_k)^2, \quad G = (a + j b) / A
+
+    over the last whole periods of the record after `settle`. Offset and drift go with the fit, so that a slow transient
+    does not count as response. White noise of two-sided root density N leaves a standard deviation of N sqrt(2/T)/A in
+    either part of G, T the time fitted.
+
+    Parameters
+    ----------
+    reading : array_like, shape (n_time,)
+        Readings [rad/s], the first at t = 0.
+    sample_rate_hz, freq_hz : float
+        Rate of the readings and frequency of the sine [Hz].
+    amplitude : float
+        A [rad/s].
+    settle : float, optional
+        Time at the start that is left out [s].
+
+    Returns
+    -------
+    complex
+        G(j 2 pi f) [-].
+
+    Raises
+    ------
+    ValueError
+        If less than a period is left, or the frequency is not below half the sample rate.
+    """
+    z = np.asarray(reading, float)
+    periods = np.floor((z.size / sample_rate_hz - settle) * freq_hz + 1e-9)
+    if not (0.0 < freq_hz < sample_rate_hz / 2.0 and periods >= 1.0):
+        msg = (
+            f"reading: expected at least a period of {freq_hz:g} Hz, below {sample_rate_hz / 2.0:g} Hz, got "
+            f"{z.size} samples and {settle:g} s to settle"
+        )
+        raise ValueError(msg)
+    first = z.size - round(periods * sample_rate_hz / freq_hz)
+    t = np.arange(first, z.size) / sample_rate_hz
+    turn = 2.0 * np.pi * freq_hz * t
+    basis = np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(t), t - t.mean()])
+    a, b = np.linalg.lstsq(basis, z[first:], rcond=None)[0][:2]
+    return complex(a, b) / amplitude
+
+
+def identify(
+    freq_hz: FloatArray,
+    response: ComplexArray,
+    *,
+    real_poles: int,
+    pole_pairs: int = 0,
+    blind_at_dc: bool = False,
+    weight: FloatArray | None = None,
+) -> Identified:
+    r"""Fit a strictly proper, stable transfer function to samples of a frequency response.
+
+    .. math:: \min \sum_k w_k^2 |G(j 2 \pi f_k) / H_k - 1|^2, \quad G(s) = N(s) / D(s), \deg N < \deg D
+
+    The poles are searched (Levenberg-Marquardt in the logarithms of real poles, corners and damping, which keeps them
+    stable); for given poles N is linear least squares (variable projection, Golub and Pereyra 1973). s is scaled to the
+    middle of the band.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Frequencies [Hz], best spaced evenly in logarithm.
+    response : ndarray of complex, shape (n_freq,)
+        Indicated over true rate H [-].
+    real_poles, pole_pairs : int
+        Number of real poles and of complex pairs, at least one pole in all.
+    blind_at_dc : bool, optional
+        Force G(0) = 0, as for an MHD sensor.
+    weight : ndarray, shape (n_freq,), optional
+        Weight w of each sample [-]; default 1: relative errors count alike.
+
+    Returns
+    -------
+    Identified
+        Transfer function and its worst relative misfit.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer samples than coefficients, or a sample is zero or not finite.
+    """
+    from scipy.optimize import least_squares
+
+    freq, H = np.asarray(freq_hz, float), np.asarray(response, complex)
+    w = np.ones(freq.size) if weight is None else np.asarray(weight, float)
+    n_pole = real_poles + 2 * pole_pairs
+    if n_pole < 1 or freq.shape != H.shape or freq.size < 2 * n_pole or w.shape != freq.shape:
+        msg = (
+            f"response: expected at least {max(2 * n_pole, 2)} samples at as many frequencies for {n_pole} poles, "
+            f"got {freq.size}, {H.size}"
+        )
+        raise ValueError(msg)
+    if not (np.all(np.isfinite(H)) and np.all(np.abs(H) > 0.0) and np.all(freq > 0.0)):
+        msg = "response: expected finite values other than 0 at frequencies above 0 Hz"
+        raise ValueError(msg)
+    unit = 2.0 * np.pi * np.sqrt(freq[0] * freq[-1])
+    s = 2j * np.pi * freq / unit
+
+    def residual(place: FloatArray) -> FloatArray:
+        error = w * (_fitted(s, H, w, _denominator(place, real_poles), blind_at_dc)[1] / H - 1.0)
+        return np.concatenate([error.real, error.imag])
+
+    tried = []
+    for share in _SPREADS:
+        start = _start(np.abs(s), real_poles, pole_pairs, share)
+        rounds = _ROUNDS * start.size
+        tried.append(least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=rounds))
+        if tried[-1].cost < _EXACT:
+            break
+    D = _denominator(min(tried, key=lambda one: float(one.cost)).x, real_poles)
+    N, G = _fitted(s, H, w, D, blind_at_dc)
+    powers = unit ** np.arange(n_pole + 1.0)
+    return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / H - 1.0))))
+
+
+def _start(reach: FloatArray, real_poles: int, pole_pairs: int, share: tuple[float, float]) -> FloatArray:
+    """Return poles spread over a share of the band: logarithms of the real ones, then of corner and damping of each
+    pair.
+    """
+    low, high = np.interp(share, [0.0, 1.0], np.log([reach[0], reach[-1]]))
+    real = low + (high - low) * (np.arange(real_poles) + 1.0) / (real_poles + 1.0)
+    corners = low + (high - low) * (np.arange(pole_pairs) + 1.0) / (pole_pairs + 1.0)
+    return np.concatenate([real, corners, np.full(pole_pairs, np.log(0.7))])
+
+
+def _denominator(place: FloatArray, real_poles: int) -> FloatArray:
+    """Return D, monic, highest power first."""
+    pairs = (place.size - real_poles) // 2
+    D = np.ones(1)
+    for value in place[:real_poles]:
+        D = np.convolve(D, [1.0, np.exp(value)])
+    for corner, damping in zip(place[real_poles : real_poles + pairs], place[real_poles + pairs :], strict=True):
+        D = np.convolve(D, [1.0, 2.0 * np.exp(damping + corner), np.exp(2.0 * corner)])
+    return D
+
+
+def _fitted(
+    s: ComplexArray, H: ComplexArray, w: FloatArray, D: FloatArray, blind_at_dc: bool
+) -> tuple[FloatArray, ComplexArray]:
+    """Return the best N for the poles of D (highest power first, degree one below D's) and G = N/D."""
+    n = D.size - 1
+    lowest = 1 if blind_at_dc else 0
+    basis = s[:, None] ** np.arange(n - 1, lowest - 1, -1) / np.polyval(D, s)[:, None]
+    rows = (w / H)[:, None] * basis
+    system, wanted = np.concatenate([rows.real, rows.imag]), np.concatenate([w, np.zeros_like(w)])
+    size = np.linalg.norm(system, axis=0)
+    fit = np.linalg.lstsq(system / size, wanted, rcond=None)[0] / size
+    N = np.concatenate([fit, np.zeros(lowest)])
+    return N, basis @ fit

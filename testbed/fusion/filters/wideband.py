@@ -1,0 +1,167 @@
+"""One filter for every frequency: a bank of Kalman filters, one per bandwidth, mixed by how well each foresees the
+readings.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FormParameters
+from testbed.fusion.kernels.bank import BANK_HEADER_ROWS, BANK_ROWS, LEVEL, REFUSED, bank_kernel
+from testbed.fusion.kernels.covariance import INNOVATION, INNOVATION_VARIANCE, RATE, STD
+from testbed.fusion.model import build_model
+from testbed.units import PositiveDuration
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.parts import Part
+    from testbed.signals import FloatArray
+
+
+class WidebandParameters(FormParameters):
+    """Parameters of `Wideband`; q, here the lowest of the bank, is 1e4 (deg/s)^2/s^5 for order 3.
+
+    Parameters
+    ----------
+    decades : float
+        The highest q of the bank over the lowest, in powers of ten.
+    filters : int
+        Number of filters, their q evenly spaced in logarithm.
+    memory : float
+        Time constant with which old readings lose their say on the weights [s]; 50 ms is a factor of 0.999 per sample
+        at 20 kHz.
+    restart : float
+        A filter slower than the most likely one, and by the factor exp(-restart) less likely, starts again from that
+        one's state.
+    gate : float
+        A reading is refused if even the filter least surprised by it finds it that many standard deviations off.
+    patience : int
+        Readings that the gate may refuse in a row: what lasts longer is taken for the signal.
+    stuck_after : int
+        A sensor that repeats its reading exactly that often is taken for stuck and not read until it changes; 0 is
+        never.
+    """
+
+    default_q: ClassVar[dict[int, float]] = {3: 1e4 * DEG**2}
+
+    order: Annotated[int, Field(ge=1, le=3)] = 3
+    decades: Annotated[float, Field(gt=0.0, le=30.0)] = 15.0
+    filters: Annotated[int, Field(ge=2, le=32)] = 16
+    memory: PositiveDuration = 0.05
+    restart: Annotated[float, Field(gt=0.0)] = 20.0
+    gate: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
+    patience: Annotated[int, Field(ge=0)] = 10
+    stuck_after: Annotated[int, Field(ge=0)] = 10
+
+
+class Wideband(BlockFilter):
+    r"""Bank of Kalman filters with process noise :math:`q_1 \ldots q_M`, mixed by innovation likelihood.
+
+    .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
+        \hat x = \sum w_i \hat x_i, \quad P = \sum w_i (P_i + (\hat x_i - \hat x)^2)
+
+    with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run
+    side by side and differ in how fast a signal they expect. One that is too slow for the signal spoils its slow
+    states, which take half a minute to recover: it is given state and covariance of the best filter until it does
+    better. A square beyond gate^2 counts by its logarithm. No band, no threshold on the signal. Refused readings
+    (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the weighted mean
+    of log10 q [rad^2/s^(2m+1)].
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Dynamics and noise of each sensor.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+    parameters : WidebandParameters
+        Bank, mixing, and what is refused.
+
+    References
+    ----------
+    Magill, IEEE Trans. Automatic Control 10 (1965) 434-439 (bank of filters weighted by likelihood); Bar-Shalom, Li,
+    Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), section 11.6.2 (static multiple
+    models), here with forgetting.
+    """
+
+    Parameters: ClassVar[type[Part]] = WidebandParameters
+
+    def __init__(
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: WidebandParameters
+    ) -> None:
+        super().__init__(belief, sample_rate_hz, parameters)
+        q = parameters.q * np.logspace(0.0, parameters.decades, parameters.filters)
+        self._R = self.measurement_noise("R", {}, explicit=False)
+        self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
+        self._levels = np.log10(q)
+        self._x = np.zeros((self._x.size, q.size))
+        self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
+        self._score = np.zeros(q.size)
+        self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
+        forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
+        self._setting = np.array(
+            [0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart]
+        )
+        self._columns = _columns(self.model.F), _columns(self.model.H)
+        self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form)
+
+    def _noise_of_bank(
+        self,
+        belief: Mapping[str, SensorBelief],
+        sample_rate_hz: Mapping[str, float],
+        parameters: WidebandParameters,
+        q: FloatArray,
+    ) -> FloatArray:
+        """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
+        order, use = parameters.order, parameters.use_input_noise
+        models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
+        return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
+
+    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
+        """Filter the next block.
+
+        Parameters
+        ----------
+        readings : mapping of str to array_like, shape (n_sensor_samples,)
+            Readings that are due in the block [rad/s]; not finite means predict only.
+
+        Returns
+        -------
+        EstimateBlock
+            At the fastest rate, shape (n_time,).
+
+        Raises
+        ------
+        ValueError
+            If a sensor is missing, unknown or has not as many readings as are due.
+        """
+        Z = self.spread(readings)
+        out = np.empty((BANK_HEADER_ROWS + BANK_ROWS * len(Z), Z.shape[1]))
+        model, (of_F, of_H) = self.model, self._columns
+        mixing = (self._score, self._watch, self._setting, self._levels)
+        self._run(self._x, self._P, model.F, of_F, self._Q, model.H, of_H, self._R, Z, *mixing, out)
+        diagnostics = {"log10_q": out[LEVEL]}
+        for i, name in enumerate(model.sensors):
+            row = BANK_HEADER_ROWS + BANK_ROWS * i
+            diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
+            diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
+            diagnostics[f"refused_{name}"] = out[row + REFUSED]
+        return EstimateBlock(out[RATE], out[STD], diagnostics)
+
+
+def _columns(matrix: FloatArray) -> np.ndarray:
+    """Return for each row the columns that are not zero, then unused places, their number last; shape (n_row, n_column
+    + 1).
+    """
+    columns = np.zeros((matrix.shape[0], matrix.shape[1] + 1), dtype=np.int64)
+    for row, values in zip(columns, matrix, strict=True):
+        (at,) = np.nonzero(values)
+        row[: at.size], row[-1] = at, at.size
+    return columns

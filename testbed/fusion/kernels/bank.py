@@ -1,0 +1,410 @@
+"""The compiled steps of a bank of Kalman filters side by side: the innermost loop runs over the filters, so that it
+becomes vector code.
+
+The filters differ in Q only. Each step does to all of them what its namesake in `testbed.fusion.kernels.covariance`
+does to one; so do the rules for readings, forms and numba's cache that stand there.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from testbed.fusion.kernels.covariance import (
+    CONVENTIONAL,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    JOSEPH,
+    RATE,
+    SQUARE_ROOT,
+    STD,
+)
+
+# Rows of the output, the first two as in `kernels`; then BANK_ROWS per sensor, the first two as there.
+LEVEL, BANK_HEADER_ROWS = 2, 3
+REFUSED, BANK_ROWS = 2, 3
+# Beyond this [rad^2/s^2] a filter of the bank knows nothing of the rate.
+LOST_VARIANCE = 1.0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form):  # noqa: PLR0912  # pragma: no cover
+    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
+
+    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double
+    precision. In JOSEPH form one half of P is computed and copied, in CONVENTIONAL every element is computed for
+    itself.
+    """
+    for m in range(M):
+        lost[m] = P[0, 0, m] > LOST_VARIANCE
+    for i in range(n):
+        for m in range(M):
+            moved[i, m] = 0.0
+            for j in range(n):
+                work[i, j, m] = 0.0
+        for s in range(nonzero[i, n]):
+            k = nonzero[i, s]
+            factor = F[i, k]
+            for m in range(M):
+                moved[i, m] += factor * x[k, m]
+            for j in range(n):
+                for m in range(M):
+                    work[i, j, m] += factor * P[k, j, m]
+    for i in range(n):
+        for m in range(M):
+            x[i, m] = x[i, m] if lost[m] else moved[i, m]
+        for j in range(n if form == CONVENTIONAL else i + 1):
+            for m in range(M):
+                moved[i, m] = Q[i, j, m]
+            for s in range(nonzero[j, n]):
+                k = nonzero[j, s]
+                factor = F[j, k]
+                for m in range(M):
+                    moved[i, m] += factor * work[i, k, m]
+            for m in range(M):
+                P[i, j, m] = P[i, j, m] if lost[m] else moved[i, m]
+                if form != CONVENTIONAL:
+                    P[j, i, m] = P[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovate_bank(x, P, h, seen, z, e, spread, g, n, M):  # pragma: no cover
+    """Set e = z - h x, g = P h' and spread = h P h' of each of M filters; `seen` lists where h is not zero."""
+    for m in range(M):
+        e[m] = z
+        spread[m] = 0.0
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = 0.0
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += P[j, k, m] * h[k]
+    for s in range(seen[n]):
+        k = seen[s]
+        for m in range(M):
+            e[m] -= h[k] * x[k, m]
+            spread[m] += h[k] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_bank` to M filters, in the Joseph form of `update`."""
+    for j in range(n):
+        for m in range(M):
+            K[j, m] = g[j, m] / (spread[m] + R)
+            x[j, m] += K[j, m] * e[m]
+    for j in range(n):
+        for k in range(n):
+            for m in range(M):
+                P[j, k, m] -= K[j, m] * g[k, m]
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = -R * K[j, m]
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += P[j, k, m] * h[k]
+    for j in range(n):
+        for k in range(j + 1):
+            for m in range(M):
+                P[j, k, m] -= g[j, m] * K[k, m]
+                P[k, j, m] = P[j, k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_plain_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_bank` to M filters, in the short form of `update_plain`."""
+    for j in range(n):
+        for m in range(M):
+            K[j, m] = g[j, m] / (spread[m] + R)
+            x[j, m] += K[j, m] * e[m]
+    for k in range(n):
+        for m in range(M):
+            g[k, m] = 0.0
+        for s in range(seen[n]):
+            j = seen[s]
+            for m in range(M):
+                g[k, m] += h[j] * P[j, k, m]
+    for j in range(n):
+        for k in range(n):
+            for m in range(M):
+                P[j, k, m] -= K[j, m] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def triangularise_bank(A, n, width, scale, total, M):  # noqa: PLR0912  # pragma: no cover
+    """Do what `triangularise` does to M matrices side by side, A (n, n + width - 1, M)."""
+    for i in range(n):
+        for m in range(M):
+            scale[m] = 0.0
+        for k in range(i + 1, i + width):
+            for m in range(M):
+                scale[m] += A[i, k, m] * A[i, k, m]
+        for m in range(M):
+            length = np.sqrt(scale[m] + A[i, i, m] * A[i, i, m])
+            head = A[i, i, m] + length if A[i, i, m] > 0.0 else A[i, i, m] - length
+            scale[m] = 0.5 * (head * head + scale[m])
+            # A row of zeros reflects nothing.
+            scale[m] = scale[m] if scale[m] > 0.0 else 1.0
+            A[i, i, m] = head
+        for j in range(i + 1, n):
+            for m in range(M):
+                total[m] = 0.0
+            for k in range(i, i + width):
+                for m in range(M):
+                    total[m] += A[j, k, m] * A[i, k, m]
+            for m in range(M):
+                total[m] /= scale[m]
+            for k in range(i, i + width):
+                for m in range(M):
+                    A[j, k, m] -= total[m] * A[i, k, m]
+        for m in range(M):
+            # The scale is the head times the new diagonal, but for the sign.
+            A[i, i, m] = -scale[m] / A[i, i, m] if A[i, i, m] != 0.0 else 0.0
+        for k in range(i + 1, i + width):
+            for m in range(M):
+                A[i, k, m] = 0.0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_root_bank(x, D, F, nonzero, S, array, moved, scale, total, lost, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Do what `predict_bank` does to roots, by the QR of [F D, S]'; S is lower triangular."""
+    for m in range(M):
+        total[m] = 0.0
+    for k in range(n):
+        for m in range(M):
+            total[m] += D[0, k, m] * D[0, k, m]
+    for m in range(M):
+        lost[m] = total[m] > LOST_VARIANCE
+    for i in range(n):
+        for m in range(M):
+            moved[i, m] = 0.0
+        for j in range(n):
+            for m in range(M):
+                array[i, j, m] = 0.0
+                array[i, n + j, m] = S[i, j, m]
+        for s in range(nonzero[i, n]):
+            k = nonzero[i, s]
+            factor = F[i, k]
+            for m in range(M):
+                moved[i, m] += factor * x[k, m]
+            for j in range(n):
+                for m in range(M):
+                    array[i, j, m] += factor * D[k, j, m]
+    triangularise_bank(array, n, n + 1, scale, total, M)
+    for i in range(n):
+        for m in range(M):
+            x[i, m] = x[i, m] if lost[m] else moved[i, m]
+        for j in range(n):
+            for m in range(M):
+                D[i, j, m] = D[i, j, m] if lost[m] else array[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovate_root_bank(x, D, h, seen, z, e, spread, g, n, M):  # pragma: no cover
+    """Set e = z - h x, g = D' h' and spread = |g|^2 of each of M filters; `seen` lists where h is not zero."""
+    for m in range(M):
+        e[m] = z
+        spread[m] = 0.0
+    for s in range(seen[n]):
+        k = seen[s]
+        for m in range(M):
+            e[m] -= h[k] * x[k, m]
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = 0.0
+        for s in range(seen[n]):
+            k = seen[s]
+            for m in range(M):
+                g[j, m] += h[k] * D[k, j, m]
+        for m in range(M):
+            spread[m] += g[j, m] * g[j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_root_bank(x, D, R, e, spread, g, total, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Apply the reading behind (e, spread, g) of `innovate_root_bank` to M filters, as `update_root` does."""
+    root = np.sqrt(R)
+    for j in range(n):
+        for m in range(M):
+            total[m] = 0.0
+        for k in range(n):
+            for m in range(M):
+                total[m] += D[j, k, m] * g[k, m]
+        for m in range(M):
+            total[m] /= spread[m] + R
+            x[j, m] += total[m] * e[m]
+        for k in range(n):
+            for m in range(M):
+                D[j, k, m] -= total[m] * g[k, m]
+        for m in range(M):
+            total[m] *= root * (root + np.sqrt(spread[m] + R))
+        for k in range(n):
+            for m in range(M):
+                total[m] -= D[j, k, m] * g[k, m]
+        for m in range(M):
+            length = np.sqrt(spread[m] + R)
+            total[m] /= length * (length + root)
+        for k in range(n):
+            for m in range(M):
+                D[j, k, m] += total[m] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def admit(watch, z, smallest, gate, patience, stuck_after):  # pragma: no cover
+    """Return whether a reading is to be used; `watch` = [last reading, equal ones before it, refused in a row, refused
+    so far].
+
+    `smallest` is its innovation over the standard deviation, in the filter that finds it least surprising.
+    """
+    watch[1] = watch[1] + 1.0 if z == watch[0] else 0.0
+    watch[0] = z
+    stuck = stuck_after > 0 and watch[1] >= stuck_after
+    if smallest <= gate:
+        watch[2] = 0.0
+    else:
+        watch[2] += 1.0
+    # A signal that truly jumped stays outside the gate; a spike does not.
+    if stuck or 0.0 < watch[2] <= patience:
+        watch[3] += 1.0
+        return False
+    return True
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def log_likelihood(e, C, gate):  # pragma: no cover
+    """Return -(ln C + e^2/C)/2, where e^2/C beyond gate^2 grows by its logarithm only: one reading never decides for
+    long.
+    """
+    ratio = abs(e) / np.sqrt(C)
+    nis = ratio * ratio
+    if ratio > gate:
+        nis = gate * gate * (1.0 + 2.0 * np.log(ratio / gate))
+    return -0.5 * (nis + np.log(C))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def weigh(score, weight, M):  # pragma: no cover
+    """Set `weight` = exp(score) / sum, the largest score taken off first; return nothing."""
+    top = score[0]
+    for m in range(1, M):
+        top = max(top, score[m])
+    total = 0.0
+    for m in range(M):
+        score[m] -= top
+        weight[m] = np.exp(score[m])
+        total += weight[m]
+    for m in range(M):
+        weight[m] /= total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def start_again(x, P, score, restart, n, M):  # pragma: no cover
+    """Give the filters slower than the best one, and by exp(-restart) less likely, its state and covariance; `score`
+    ends at 0.
+    """
+    best = 0
+    for m in range(1, M):
+        if score[m] > score[best]:
+            best = m
+    for m in range(best):
+        if score[m] < -restart:
+            for j in range(n):
+                x[j, m] = x[j, best]
+                for k in range(n):
+                    P[j, k, m] = P[j, k, best]
+
+
+@functools.lru_cache
+def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters
+    over a block.
+
+    They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots.
+    `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the columns of F and H that are not zero, their number last.
+    `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 4) as in `admit`, `setting` = [started,
+    forget, gate, patience, stuck_after, restart], `levels` (M,) what the weights average into the row LEVEL.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
+        P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
+        F, H = np.empty((n, n)), np.empty((n_sensor, n))
+        e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
+        used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
+        x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
+        forget, gate, patience, stuck_after = setting[1], setting[2], setting[3], setting[4]
+        weigh(score, weight, M)
+        for k in range(Z.shape[1]):
+            if setting[0] > 0.0:
+                if form == SQUARE_ROOT:
+                    predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, lost, n, M)
+                else:
+                    predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form)
+            informed = False
+            for i in range(n_sensor):
+                row = BANK_HEADER_ROWS + BANK_ROWS * i
+                out[row + INNOVATION, k] = np.nan
+                out[row + INNOVATION_VARIANCE, k] = np.nan
+                used[i] = False
+                if np.isfinite(Z[i, k]):
+                    if form == SQUARE_ROOT:
+                        innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    else:
+                        innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    mean, smallest = 0.0, np.inf
+                    for m in range(M):
+                        mean += weight[m] * e[m]
+                        smallest = min(smallest, abs(e[m]) / np.sqrt(spread[m] + R[i]))
+                    variance = R[i]
+                    for m in range(M):
+                        variance += weight[m] * (spread[m] + (e[m] - mean) ** 2)
+                    out[row + INNOVATION, k] = mean
+                    out[row + INNOVATION_VARIANCE, k] = variance
+                    used[i] = admit(watch[i], Z[i, k], smallest, gate, patience, stuck_after)
+                    informed = informed or used[i]
+                out[row + REFUSED, k] = watch[i, 3]
+            if informed:
+                setting[0] = 1.0
+                for m in range(M):
+                    score[m] *= forget
+                for i in range(n_sensor):
+                    if used[i]:
+                        if form == SQUARE_ROOT:
+                            innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        else:
+                            innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        for m in range(M):
+                            score[m] += log_likelihood(e[m], spread[m] + R[i], gate)
+                        if form == SQUARE_ROOT:
+                            update_root_bank(x, P, R[i], e, spread, g, total, n, M)
+                        elif form == JOSEPH:
+                            update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                        else:
+                            update_plain_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                weigh(score, weight, M)
+                start_again(x, P, score, setting[5], n, M)
+            rate, variance, level = 0.0, 0.0, 0.0
+            for m in range(M):
+                rate += weight[m] * x[0, m]
+                level += weight[m] * levels[m]
+            for m in range(M):
+                own = P[0, 0, m]
+                if form == SQUARE_ROOT:
+                    own *= own
+                    for j in range(1, n):
+                        own += P[0, j, m] * P[0, j, m]
+                variance += weight[m] * (own + (x[0, m] - rate) ** 2)
+            out[RATE, k] = rate
+            out[STD, k] = np.sqrt(variance)
+            out[LEVEL, k] = level
+        x_in[:], P_in[:] = x, P
+
+    return run

@@ -1,0 +1,706 @@
+"""The compiled steps of the filters with one covariance, for sizes known to the compiler.
+
+`kalman_kernel`, `fixed_gain_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
+sensors): loops of constant length unroll. They close over integers only, which numba's disk cache keys by value, so
+that a second process loads and does not compile. That cache watches no other file than the kernel's own: what calls
+each other stays in one file, which is why this one is long. `bank_kernel` and `two_path_kernel` share numbers with it
+but no code; who changes such a number touches those files too.
+
+The arrays handed in decide the precision: in single precision no sum of the state and covariance recursion is formed in
+double. `form` decides what stands for the covariance: P itself (CONVENTIONAL, JOSEPH), or, in SQUARE_ROOT, roots D and
+S in place of P and Q, P = D D' and Q = S S'.
+
+Readings come as one row per sensor at the fastest rate: NaN where none is due, infinite where one is due but missing
+(it also breaks the chain of differences). Both mean: predict only. Until the first reading nothing is predicted either.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+# Forms of the covariance.
+CONVENTIONAL, JOSEPH, SQUARE_ROOT = 0, 1, 2
+
+# Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
+RATE, STD, HEADER_ROWS = 0, 1, 2
+INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
+# A reading beyond this [rad/s] is no rate but a missing reading: its square would overflow.
+LARGEST_RATE = 1e6
+# A reading that many standard deviations of its innovation off is a spike and left out, but not more than PATIENCE in a
+# row: what lasts longer is the signal. So wide that the lag behind a fast signal stays inside, and a spike inside does
+# no harm that lasts.
+GATE, PATIENCE = 1000.0, 10
+# Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
+Q_RATE, GUARD_HITS, ADAPTIVE_HEADER_ROWS = 2, 3, 4
+R_USED, INCREMENTS, BAND, INFLATION, ADAPTIVE_ROWS = 2, 3, 4, 5, 6
+
+# One record per sensor: what the adaptation was set to, and what it remembers.
+SENSOR = np.dtype(
+    [
+        ("adapt_R", np.bool_),  # (17)
+        ("adapt_offset", np.bool_),  # (16)
+        ("follow", np.bool_),  # R is N_k / dT
+        ("difference", np.bool_),  # judge by differences of the innovation
+        ("forget", np.float64),  # beta
+        ("power", np.float64),  # beta^k
+        ("offset_power", np.float64),
+        ("R", np.float64),
+        ("offset", np.float64),  # r
+        ("lowest", np.float64),  # bounds of R
+        ("highest", np.float64),
+        ("floor", np.float64),
+        ("clamp", np.float64),  # factor around the band's R, infinite for none
+        ("hits", np.int64),  # times that a bound of R held
+        ("outside", np.int64),  # readings in a row outside the gate
+        ("previous_innovation", np.float64),
+        ("previous_reading", np.float64),
+        ("increments", np.int64),  # k - 1
+        ("increment_variance", np.float64),  # N_k / dT
+        ("least_weight", np.float64),  # of a new increment; 0 is the infinite memory of (30)
+        ("wait", np.int64),  # increments before a band is judged
+        ("banded", np.bool_),
+        ("band", np.int64),  # -1 before the first judgement
+        ("thresholds", np.float64, (2,)),
+        ("levels", np.float64, (3,)),
+        ("alpha", np.float64),
+        ("window_sum", np.float64),
+        ("window_count", np.int64),
+    ]
+)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def move(x, F, moved, n):  # pragma: no cover
+    """Set x = F x."""
+    for i in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += F[i, j] * x[j]
+        moved[i] = total
+    for i in range(n):
+        x[i] = moved[i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q, exactly symmetric."""
+    move(x, F, moved, n)
+    grow(P, F, Q, work, n)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def grow(P, F, Q, work, n):  # pragma: no cover
+    """Set P = F P F' + Q, exactly symmetric."""
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = F[i, 0] * P[0, j]
+        for k in range(1, n):
+            factor = F[i, k]
+            for j in range(n):
+                work[i, j] += factor * P[k, j]
+    for i in range(n):
+        for j in range(i + 1):
+            total = Q[i, j]
+            for k in range(n):
+                total += work[i, k] * F[j, k]
+            P[i, j] = total
+            P[j, i] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovation(x, P, H, i, z, n):  # pragma: no cover
+    """Return (z - H_i x, H_i P H_i')."""
+    e, spread = z, x.dtype.type(0.0)
+    for j in range(n):
+        total = x.dtype.type(0.0)
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        e -= H[i, j] * x[j]
+        spread += H[i, j] * total
+    return e, spread
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def outside_gate(count, e, C):  # pragma: no cover
+    """Return how many readings in a row, `count` before this one, are outside the gate; up to PATIENCE of them are left
+    out.
+    """
+    return count + 1 if e * e > GATE * GATE * C else 0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+    """Apply one scalar reading in Joseph form, P = (I - K h)P(I - K h)' + K R K', its factors applied one after the
+    other.
+    """
+    e, C = z, R
+    for j in range(n):
+        total = x.dtype.type(0.0)
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        g[j] = total
+    for j in range(n):
+        e -= H[i, j] * x[j]
+        C += H[i, j] * g[j]
+    for j in range(n):
+        K[j] = g[j] / C
+        x[j] += K[j] * e
+    for j in range(n):
+        for k in range(n):
+            P[j, k] -= K[j] * g[k]
+    for j in range(n):
+        total = -R * K[j]
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        g[j] = total
+    for j in range(n):
+        for k in range(j + 1):
+            total = P[j, k] - g[j] * K[k]
+            P[j, k] = total
+            P[k, j] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_plain(x, P, F, Q, work, moved, n):  # pragma: no cover
+    """Set x = F x and P = F P F' + Q, every element computed for itself."""
+    move(x, F, moved, n)
+    for i in range(n):
+        for j in range(n):
+            total = x.dtype.type(0.0)
+            for k in range(n):
+                total += F[i, k] * P[k, j]
+            work[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            total = Q[i, j]
+            for k in range(n):
+                total += work[i, k] * F[j, k]
+            P[i, j] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_plain(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+    """Apply one scalar reading in the short form P = P - K h P, whose rounding can cost P its symmetry and its positive
+    eigenvalues.
+    """
+    e, C = innovation(x, P, H, i, z, n)
+    C += R
+    for j in range(n):
+        total = x.dtype.type(0.0)
+        for k in range(n):
+            total += P[j, k] * H[i, k]
+        K[j] = total / C
+    for k in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += H[i, j] * P[j, k]
+        g[k] = total
+    for j in range(n):
+        x[j] += K[j] * e
+        for k in range(n):
+            P[j, k] -= K[j] * g[k]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def triangularise(A, n, width):  # pragma: no cover
+    """Bring A (n, n + width - 1) to lower triangular form by Householder reflections from the right, which leaves A A'
+    as it is.
+
+    Row i must be zero from column i + width on.
+    """
+    zero = A.dtype.type(0.0)
+    for i in range(n):
+        square = zero
+        for k in range(i + 1, i + width):
+            square += A[i, k] * A[i, k]
+        if square == zero:
+            continue
+        length = np.sqrt(square + A[i, i] * A[i, i])
+        # The sign without cancellation.
+        head = A[i, i] + length if A[i, i] > zero else A[i, i] - length
+        scale = (head * head + square) / A.dtype.type(2.0)
+        diagonal = A[i, i] - head
+        A[i, i] = head
+        for j in range(i + 1, n):
+            total = zero
+            for k in range(i, i + width):
+                total += A[j, k] * A[i, k]
+            total /= scale
+            for k in range(i, i + width):
+                A[j, k] -= total * A[i, k]
+        A[i, i] = diagonal
+        for k in range(i + 1, i + width):
+            A[i, k] = zero
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
+    """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'; S is lower triangular."""
+    move(x, F, moved, n)
+    for i in range(n):
+        for j in range(n):
+            array[i, j] = F[i, 0] * D[0, j]
+            array[i, n + j] = S[i, j]
+        for k in range(1, n):
+            for j in range(n):
+                array[i, j] += F[i, k] * D[k, j]
+    triangularise(array, n, n + 1)
+    for i in range(n):
+        for j in range(n):
+            D[i, j] = array[i, j]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovation_root(x, D, H, i, z, n):  # pragma: no cover
+    """Return (z - H_i x, |D' H_i'|^2)."""
+    e, spread = z, x.dtype.type(0.0)
+    for j in range(n):
+        e -= H[i, j] * x[j]
+    for k in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += H[i, j] * D[j, k]
+        spread += total * total
+    return e, spread
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def project_root(D, H, R, due, G, C, n, n_sensor):  # pragma: no cover
+    """Set G = H D, zero for a sensor that is not due, and C lower triangular with C C' = G G' + R."""
+    zero = D.dtype.type(0.0)
+    for i in range(n_sensor):
+        for k in range(n):
+            total = zero
+            if due[i]:
+                for j in range(n):
+                    total += H[i, j] * D[j, k]
+            G[i, k] = total
+    for i in range(n_sensor):
+        for m in range(i + 1):
+            total = R[i] if m == i else zero
+            for k in range(n):
+                total += G[i, k] * G[m, k]
+            for k in range(m):
+                total -= C[i, k] * C[m, k]
+            C[i, m] = np.sqrt(total) if m == i else total / C[m, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def gain_root(x, D, H, e, R, due, G, C, K, n, n_sensor):  # pragma: no cover
+    """Set K = D G' (C C')^-1 and x = x + K e, all readings at once; a sensor that is not due has e and K zero."""
+    zero = x.dtype.type(0.0)
+    project_root(D, H, R, due, G, C, n, n_sensor)
+    for j in range(n):
+        for i in range(n_sensor):
+            total = zero
+            for k in range(n):
+                total += D[j, k] * G[i, k]
+            for k in range(i):
+                total -= K[j, k] * C[i, k]
+            K[j, i] = total / C[i, i]
+        for i in range(n_sensor - 1, -1, -1):
+            total = K[j, i]
+            for k in range(i + 1, n_sensor):
+                total -= K[j, k] * C[k, i]
+            K[j, i] = total / C[i, i]
+        for i in range(n_sensor):
+            x[j] += K[j, i] * e[i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_root(D, G, K, R, due, n, n_sensor):  # noqa: PLR0912  # pragma: no cover
+    """Apply the Joseph form D D' = (I - K H)D D'(I - K H)' + K R K', G = H D, by reflections of [(I - K H)D, K R^(1/2)]
+    from the right.
+
+    Its null vectors are known, the rows of [-G, R^(1/2)]: one reflection for each reading turns them into the last
+    columns, which then are zero. D does not stay triangular; G is used up.
+    """
+    for i in range(n_sensor):
+        if due[i]:
+            for j in range(n):
+                for k in range(n):
+                    D[j, k] -= K[j, i] * G[i, k]
+    for i in range(n_sensor):
+        if due[i]:
+            square, root = R[i], np.sqrt(R[i])
+            for k in range(n):
+                square += G[i, k] * G[i, k]
+            tip = root + np.sqrt(square)
+            scale = tip * (tip - root)
+            for j in range(n):
+                total = K[j, i] * root * tip
+                for k in range(n):
+                    total -= D[j, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    D[j, k] += total * G[i, k]
+            for m in range(i + 1, n_sensor):
+                total = D.dtype.type(0.0)
+                for k in range(n):
+                    total += G[m, k] * G[i, k]
+                total /= scale
+                for k in range(n):
+                    G[m, k] -= total * G[i, k]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def row_square(D, j, n):  # pragma: no cover
+    """Return (D D')_jj."""
+    total = D.dtype.type(0.0)
+    for k in range(n):
+        total += D[j, k] * D[j, k]
+    return total
+
+
+@functools.lru_cache
+def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
+
+    x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is
+    (n_sensor, n_time); `outside` (n_sensor,) counts as in `outside_gate`; `out` (HEADER_ROWS + INNOVATION_ROWS *
+    n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912  # pragma: no cover
+        # The branches on `form` are taken by the compiler.
+        # Local copies have a constant shape, so their index arithmetic folds.
+        kind = x_in.dtype
+        x, moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        P, F, Q, work = np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind)
+        H = np.empty((n_sensor, n), kind)
+        G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
+        array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        for k in range(Z.shape[1]):
+            if started:
+                if form == SQUARE_ROOT:
+                    predict_root(x, P, F, Q, array, moved, n)
+                elif form == JOSEPH:
+                    predict(x, P, F, Q, work, moved, n)
+                else:
+                    predict_plain(x, P, F, Q, work, moved, n)
+            read = False
+            for i in range(n_sensor):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                out[row + INNOVATION, k] = np.nan
+                out[row + INNOVATION_VARIANCE, k] = np.nan
+                due[i] = np.isfinite(Z[i, k])
+                e[i] = kind.type(0.0)
+                if due[i]:
+                    if form == SQUARE_ROOT:
+                        e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
+                    else:
+                        e[i], spread = innovation(x, P, H, i, kind.type(Z[i, k]), n)
+                    outside[i] = outside_gate(outside[i], e[i], spread + R[i])
+                    if 0 < outside[i] <= PATIENCE:
+                        due[i], e[i] = False, kind.type(0.0)
+                        continue
+                    read = True
+                    out[row + INNOVATION, k] = e[i]
+                    out[row + INNOVATION_VARIANCE, k] = spread + R[i]
+            if read:
+                started = True
+            if form == SQUARE_ROOT:
+                if read:
+                    gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                # Sent out first: in hardware the covariance has until the next reading.
+                out[RATE, k] = x[0]
+                if read:
+                    update_root(P, G, gain, R, due, n, n_sensor)
+                out[STD, k] = np.sqrt(row_square(P, 0, n))
+            else:
+                for i in range(n_sensor):
+                    if due[i]:
+                        if form == JOSEPH:
+                            update(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                        else:
+                            update_plain(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                out[RATE, k] = x[0]
+                out[STD, k] = np.sqrt(P[0, 0])
+        x_in[:], P_in[:] = x, P
+        return started
+
+    return run
+
+
+@functools.lru_cache
+def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
+    """Return run(x, P, F, Q, H, K, C, settled, Z, progress, out), a filter of settled gains over a block.
+
+    K (n_step, n, n_sensor), C (n_step, n_sensor), the variance of an innovation, and `settled` (n_step, n, n), the
+    covariance after the readings, repeat; `progress` = [started, step], then one count per sensor as in `outside_gate`.
+    P follows `settled` while readings come, and grows by F P F' + Q while none does. `out` as in `kalman_kernel`.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # pragma: no cover
+        x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H = np.empty((n_sensor, n))
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        for k in range(Z.shape[1]):
+            read, started = False, progress[0] > 0
+            if started:
+                move(x, F, moved, n)
+            for i in range(n_sensor):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                e[i] = np.nan
+                if np.isfinite(Z[i, k]):
+                    e[i] = Z[i, k]
+                    for j in range(n):
+                        e[i] -= H[i, j] * x[j]
+                    # The gains are settled from the start, but what is known of the first reading is not.
+                    known = C[progress[1], i] if started else innovation(x, P, H, i, Z[i, k], n)[1]
+                    progress[2 + i] = outside_gate(progress[2 + i], e[i], known)
+                    if 0 < progress[2 + i] <= PATIENCE:
+                        e[i] = np.nan
+                    else:
+                        read = True
+                out[row + INNOVATION, k] = e[i]
+                out[row + INNOVATION_VARIANCE, k] = C[progress[1], i] if np.isfinite(e[i]) else np.nan
+            for i in range(n_sensor):
+                if np.isfinite(e[i]):
+                    for j in range(n):
+                        x[j] += K[progress[1], j, i] * e[i]
+            if read:
+                progress[0] = 1
+                P[:] = settled[progress[1]]
+            elif started:
+                grow(P, F, Q, work, n)
+            progress[1] = (progress[1] + 1) % len(K)
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(P[0, 0])
+        x_in[:], P_in[:] = x, P
+
+    return run
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def watch_increments(sensor, z):  # pragma: no cover
+    """Update N_k / dT by (28)-(30): the mean of half the squared increments, or its fading form."""
+    if np.isfinite(sensor.previous_reading):
+        sensor.increments += 1
+        weight = max(1.0 / sensor.increments, sensor.least_weight)
+        step = z - sensor.previous_reading
+        sensor.increment_variance += weight * (0.5 * step * step - sensor.increment_variance)
+    sensor.previous_reading = z
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def judge_band(sensor):  # pragma: no cover
+    """On entering a band of N_k, set R to the band's value; within a band leave R alone."""
+    if not sensor.banded or sensor.increments < sensor.wait:
+        return
+    band = 0
+    for level in range(2):
+        if sensor.increment_variance >= sensor.thresholds[level]:
+            band = level + 1
+    if band != sensor.band:
+        sensor.band = band
+        sensor.R = sensor.levels[band]
+        # A band may set R below the floor; then its own value is the floor.
+        sensor.lowest = min(sensor.R, max(sensor.floor, sensor.R / sensor.clamp))
+        sensor.highest = sensor.R * sensor.clamp
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def inflation(sensor, window, square, C):  # pragma: no cover
+    """Return S of (36): max(1, alpha C_hat / C), C_hat the mean (34) of `square` over the last readings."""
+    if sensor.alpha == 0.0:
+        return 1.0
+    at = sensor.window_count % window.size
+    sensor.window_sum += square - window[at]
+    window[at] = square
+    sensor.window_count += 1
+    if at == window.size - 1:
+        # Once a lap the sum is formed anew: the rounding left by one huge innovation must not stay for ever.
+        sensor.window_sum = window.sum()
+    mean = sensor.window_sum / min(sensor.window_count, window.size)
+    return max(1.0, sensor.alpha * mean / C)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def set_R(sensor, R):  # pragma: no cover
+    """Set R within its bounds."""
+    if sensor.lowest > R:
+        R = sensor.lowest
+        sensor.hits += 1
+    elif sensor.highest < R:
+        R = sensor.highest
+        sensor.hits += 1
+    sensor.R = R
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_R(sensor, square, spread):  # pragma: no cover
+    """Apply (17), R <- (1 - d)R + d(square - spread) with d = (1 - beta)/(1 - beta^(k+1)), within the bounds of R."""
+    sensor.power *= sensor.forget
+    d = (1.0 - sensor.forget) / (1.0 - sensor.power)
+    set_R(sensor, (1.0 - d) * sensor.R + d * (square - spread))
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_offset(sensor, e):  # pragma: no cover
+    """Apply (16), r <- (1 - d)r + d(z - H x_prior); the innovation `e` has r taken off already."""
+    sensor.offset_power *= sensor.forget
+    d = (1.0 - sensor.forget) / (1.0 - sensor.offset_power)
+    sensor.offset += d * e
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def observe(sensor, window, e, spread, z, row):  # pragma: no cover
+    """Prepare the use of the reading z with the innovation e (11) and spread H P H': N_k, band, R and S; fill its `row`
+    of diagnostics.
+
+    Return the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
+    """
+    watch_increments(sensor, z)
+    judge_band(sensor)
+    if sensor.follow and sensor.increments > 0:
+        set_R(sensor, sensor.increment_variance)
+    square = e * e
+    if sensor.difference:
+        square = 0.5 * (e - sensor.previous_innovation) ** 2
+    C = spread + sensor.R
+    factor = 1.0
+    if np.isfinite(square):
+        factor = inflation(sensor, window, square, C)
+    row[INNOVATION] = e
+    row[INNOVATION_VARIANCE] = C
+    row[R_USED] = sensor.R
+    row[INCREMENTS] = sensor.increment_variance if sensor.increments > 0 else np.nan
+    row[BAND] = sensor.band if sensor.band >= 0 else np.nan
+    row[INFLATION] = factor
+    return square, factor * sensor.R
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def learn(sensor, e, square, spread):  # pragma: no cover
+    """Adapt R and r of a sensor after its reading was used."""
+    if sensor.adapt_R and np.isfinite(square):
+        adapt_R(sensor, square, spread)
+    if sensor.adapt_offset:
+        adapt_offset(sensor, e)
+    sensor.previous_innovation = e
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n):  # pragma: no cover
+    """Apply (15) with +P to the chosen diagonal elements of Q; return how many the guard at zero held.
+
+    K e is x - x_prior, and A P_prev A' is P_prior - Q; of P only the diagonal counts.
+    """
+    hits = 0
+    for j in range(n):
+        if chosen[j]:
+            moved = x[j] - x_prior[j]
+            value = Q[j, j] + d * (moved * moved + P_post[j] - P_prior[j])
+            if value < 0.0:
+                value = 0.0
+                hits += 1
+            Q[j, j] = value
+    return hits
+
+
+@functools.lru_cache
+def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
+
+    As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of
+    the sliding windows in `windows` (n_sensor, n_window), the diagonal elements of Q that adapt in `chosen` (n,), and
+    `progress` = [started, beta^k, guard hits of Q]. What the adaptation remembers is in double precision whatever the
+    arrays are.
+    """
+
+    @njit(cache=True, error_model="numpy")
+    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        kind = x_in.dtype
+        x, x_prior, P_prior, P_post = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
+        P, F, Q, work = np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind), np.empty((n, n), kind)
+        H, due = np.empty((n_sensor, n), kind), np.empty(n_sensor, np.bool_)
+        e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
+        square = np.empty(n_sensor)
+        G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
+        array = np.empty((n, 2 * n), kind)
+        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        adapts_Q = chosen.any()
+        for k in range(Z.shape[1]):
+            predicted = progress[0] > 0.0
+            if predicted:
+                if form == SQUARE_ROOT:
+                    predict_root(x, P, F, Q, array, moved, n)
+                elif form == JOSEPH:
+                    predict(x, P, F, Q, work, moved, n)
+                else:
+                    predict_plain(x, P, F, Q, work, moved, n)
+            read = False
+            for i in range(n_sensor):
+                row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
+                for m in range(ADAPTIVE_ROWS):
+                    out[row + m, k] = np.nan
+                due[i] = np.isfinite(Z[i, k])
+                e[i], R[i] = kind.type(0.0), kind.type(1.0)
+                if not due[i]:
+                    continue
+                z = kind.type(Z[i, k] - sensors[i].offset)
+                if form == SQUARE_ROOT:
+                    e[i], spread[i] = innovation_root(x, P, H, i, z, n)
+                else:
+                    e[i], spread[i] = innovation(x, P, H, i, z, n)
+                sensors[i].outside = outside_gate(sensors[i].outside, e[i], spread[i] + sensors[i].R)
+                if 0 < sensors[i].outside <= PATIENCE:
+                    due[i], e[i] = False, kind.type(0.0)
+                    continue
+                read = True
+                square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
+            if adapts_Q:
+                for j in range(n):
+                    x_prior[j] = x[j]
+                    P_prior[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+            if form == SQUARE_ROOT and read:
+                gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                # Sent out first: in hardware the covariance has until the next reading.
+                out[RATE, k] = x[0]
+                update_root(P, G, gain, R, due, n, n_sensor)
+            hits = 0
+            for i in range(n_sensor):
+                if due[i]:
+                    z = kind.type(Z[i, k] - sensors[i].offset)
+                    if form == JOSEPH:
+                        update(x, P, H, i, z, R[i], g, K, n)
+                    elif form == CONVENTIONAL:
+                        update_plain(x, P, H, i, z, R[i], g, K, n)
+                    learn(sensors[i], e[i], square[i], spread[i])
+                elif not np.isnan(Z[i, k]):
+                    sensors[i].previous_innovation = np.nan
+                    sensors[i].previous_reading = np.nan
+                hits += sensors[i].hits
+            if read and predicted and adapts_Q:
+                progress[1] *= forget
+                d = (1.0 - forget) / (1.0 - progress[1])
+                for j in range(n):
+                    P_post[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+                    # Q is diagonal here, and so is its root.
+                    if form == SQUARE_ROOT:
+                        Q[j, j] = Q[j, j] * Q[j, j]
+                progress[2] += adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n)
+                if form == SQUARE_ROOT:
+                    for j in range(n):
+                        Q[j, j] = np.sqrt(Q[j, j])
+            if read:
+                progress[0] = 1.0
+            out[RATE, k] = x[0]
+            out[STD, k] = np.sqrt(row_square(P, 0, n) if form == SQUARE_ROOT else P[0, 0])
+            out[Q_RATE, k] = row_square(Q, 0, n) if form == SQUARE_ROOT else Q[0, 0]
+            out[GUARD_HITS, k] = hits + progress[2]
+        x_in[:], P_in[:], Q_in[:] = x, P, Q
+
+    return run

@@ -1,0 +1,1 @@
+"""What the filters share that divide the band between two sensors."""

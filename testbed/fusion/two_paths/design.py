@@ -1,0 +1,200 @@
+r"""Two sensors, each through a fixed linear path: what the complementary and the blending filter share.
+
+The fast path inverts the sensor that is quieter at high frequency, up to a bandwidth; the slow path takes the other one
+over below a crossover. Both are low-passes of the form that the settled Kalman filter of a signal of order m has,
+
+.. math:: L_m(s) = 1 - s^m / b_m(s / w)\,w^{-m},
+
+b_m the Butterworth polynomial: they lag in the m-th derivative only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import minimize_scalar
+from scipy.signal import buttap
+
+from testbed.fusion.belief import SensorBelief
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from testbed.fusion.belief import Realisation
+    from testbed.signals import FloatArray
+
+# Order of the band end: the rate through three integrators, as in the optimum of most signals.
+BAND_ORDER = 3
+# Where the two sensors are compared, and the crossover is looked for.
+LOW_HZ, HIGH_HZ = 1e-5, 1e3
+
+
+@dataclass(frozen=True)
+class Paths:
+    r"""The two paths in continuous time: x' = A x + B z + E h, rate = C x + D z, predicted slow reading = H x + J z.
+
+    z is the fast reading, h what is held of the slow one: the reading, or what it has beyond the prediction.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_state, n_state)
+        Dynamics [1/s].
+    B, E, C, H : ndarray, shape (n_state,)
+        Inputs [1/s] and outputs [-].
+    D, J : float
+        Feed-through [-].
+    innovate : bool
+        h is the innovation of the slow sensor and not its reading.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    E: FloatArray
+    C: FloatArray
+    D: float
+    H: FloatArray
+    J: float
+    innovate: bool
+
+    def discrete(self, T: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return (Phi, Gamma, ramp, E) over a step T [s], exact for z linear and h constant between samples.
+
+        Parameters
+        ----------
+        T : float
+            Step [s].
+        """
+        n = len(self.A)
+        block = np.zeros((n + 3, n + 3))
+        block[:n, :n], block[:n, n], block[:n, n + 2] = self.A * T, self.B * T, self.E * T
+        block[n, n + 1] = 1.0
+        power = expm(block)
+        Phi, Gamma, ramp, E = power[:n, :n], power[:n, n], power[:n, n + 1], power[:n, n + 2]
+        return Phi.copy(), Gamma.copy(), ramp.copy(), E.copy()
+
+
+def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator of L with 1 - L = O(s^order), highest power first.
+
+    Parameters
+    ----------
+    order : int
+        Power of s that 1 - L starts with [-].
+    w : float
+        Corner of the Butterworth poles [rad/s].
+    poles : int, optional
+        Their number [-]; `order` if not given, more make L fall faster.
+    """
+    n = poles or order
+    a = np.real(np.poly(buttap(n)[1])) * w ** np.arange(n + 1)
+    return a[-order:], a
+
+
+def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
+    """Return the two-sided input-referred noise density of a belief, Hz -> rad^2/s.
+
+    Parameters
+    ----------
+    sensor : SensorBelief
+        Dynamics and noise.
+    """
+    realised = sensor.realisation()
+
+    def psd(freq_hz: FloatArray) -> FloatArray:
+        density: FloatArray = sensor.input_noise**2 + sensor.output_noise**2 / np.abs(realised.response(freq_hz)) ** 2
+        return density
+
+    return psd
+
+
+def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int) -> float:
+    r"""Return the corner w [rad/s] of L that leaves the least noise.
+
+    .. math:: \min_w \int |L|^2 S_{slow} + |1 - L|^2 S_{fast}\, df
+
+    by trapezoid in ln f from 1e-5 Hz to 1 kHz, 100 points per decade. For white noise N of the slow sensor and n (1 +
+    (w_c / w)^2)^(1/2) of the fast one it is w_c n / N for order 1 and w_c n / N / sqrt(3) for order 2.
+
+    Parameters
+    ----------
+    slow, fast : SensorBelief
+        The sensor that is better at low frequency, and the other.
+    order : int
+        Order of L.
+    """
+    freq = np.logspace(math.log10(LOW_HZ), math.log10(HIGH_HZ), 801)
+    s = 2j * np.pi * freq
+    of_slow, of_fast = input_psd(slow)(freq), input_psd(fast)(freq)
+
+    def noise(log_w: float) -> float:
+        b, a = low_pass(order, math.exp(log_w))
+        L = np.polyval(b, s) / np.polyval(a, s)
+        return math.log(np.trapezoid((np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast) * freq, np.log(freq)))
+
+    bounds = math.log(2.0 * math.pi * LOW_HZ), math.log(2.0 * math.pi * HIGH_HZ)
+    return math.exp(minimize_scalar(noise, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
+
+
+def band_end(slow: SensorBelief, fast: SensorBelief, bandwidth: float) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator of the `low_pass` B that makes either sensor's inverse proper.
+
+    Parameters
+    ----------
+    slow, fast : SensorBelief
+        The sensors.
+    bandwidth : float
+        Corner of B [rad/s].
+    """
+    excess = max(len(one.denominator) - _numerator(one).size for one in (slow, fast))
+    return low_pass(BAND_ORDER, bandwidth, BAND_ORDER + max(excess - 1, 0))
+
+
+def _numerator(sensor: SensorBelief) -> FloatArray:
+    return np.trim_zeros(np.array(sensor.numerator), "f")
+
+
+def inverse(sensor: SensorBelief) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator of the inverse of a sensor, zeros at s = 0 left out.
+
+    Parameters
+    ----------
+    sensor : SensorBelief
+        Its belief.
+
+    Raises
+    ------
+    ValueError
+        If the inverse is unstable.
+    """
+    b = np.trim_zeros(_numerator(sensor), "b")
+    if np.any(np.roots(b).real >= 0.0):
+        msg = f"belief: expected a sensor whose inverse is stable, got the zeros {np.roots(b).tolist()} rad/s"
+        raise ValueError(msg)
+    return np.array(sensor.denominator), b
+
+
+def realised(numerator: FloatArray, denominator: FloatArray) -> Realisation:
+    """Return the modal realisation of a transfer function.
+
+    Parameters
+    ----------
+    numerator, denominator : ndarray, shapes (n_num,), (n_den,)
+        Coefficients in s, highest power first.
+    """
+    return SensorBelief(numerator=tuple(numerator), denominator=tuple(denominator)).realisation()
+
+
+def zeros_at_dc(sensor: SensorBelief) -> int:
+    """Return how many zeros a sensor has at s = 0 [-].
+
+    Parameters
+    ----------
+    sensor : SensorBelief
+        Its belief.
+    """
+    b = np.array(sensor.numerator)
+    return b.size - np.trim_zeros(b, "b").size

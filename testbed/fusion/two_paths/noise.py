@@ -1,0 +1,84 @@
+"""What the noise of two sensors leaves behind a filter of two fixed paths: the covariance of sensors and filter
+together.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from testbed.fusion.model import FusionModel
+    from testbed.fusion.two_paths.design import Paths
+    from testbed.signals import FloatArray
+
+_DOUBLINGS = 40
+
+
+def noise_variance(paths: Paths, model: FusionModel, slow: int, fast: int) -> FloatArray:
+    """Return the variance that the sensors' noise leaves at each step of the cycle [rad^2/s^2], shape (n_step,).
+
+    Covariance of [states of the sensors, x, fast reading, held value] with the true rate at zero, step by step over the
+    cycle of slow readings, settled by doubling.
+
+    Parameters
+    ----------
+    paths : Paths
+        The filter.
+    model : FusionModel
+        The sensors: F, Q, H, R of order 1.
+    slow, fast : int
+        Which sensor is which.
+
+    Raises
+    ------
+    ValueError
+        If the error does not settle: the loop around the slow sensor is unstable.
+    """
+    M, W, read = _joint_steps(paths, model, slow, fast)
+    around = np.linalg.multi_dot([*M[::-1], np.eye(len(read))])
+    if np.max(np.abs(np.linalg.eigvals(around))) >= 1.0:
+        msg = "crossover: expected one well inside the band of the slow sensor, got an unstable loop; give a lower one"
+        raise ValueError(msg)
+    total = np.zeros_like(around)
+    for step, noise in zip(M, W, strict=True):
+        total = step @ total @ step.T + noise
+    for _ in range(_DOUBLINGS):
+        total, around = total + around @ total @ around.T, around @ around
+    variance = []
+    for step, noise in zip(M, W, strict=True):
+        total = step @ total @ step.T + noise
+        variance.append(read @ total @ read)
+    return np.array(variance)
+
+
+def _joint_steps(
+    paths: Paths, model: FusionModel, slow: int, fast: int
+) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
+    """Return transition and noise of each step of the cycle, and the row that reads the error."""
+    F, Q, H = model.F[1:, 1:], model.Q[1:, 1:], model.H[:, 1:]
+    Phi, Gamma, ramp, E = paths.discrete(1.0 / model.sample_rate_hz)
+    n, m = len(F), len(Phi)
+    z, held = n + m, n + m + 1
+    move = np.eye(held + 1)
+    move[:n, :n] = F
+    move[z, :] = 0.0
+    move[z, :n] = H[fast] @ F
+    move[n:z, n:z], move[n:z, z], move[n:z, held] = Phi, Gamma - ramp, E
+    move[n:z, :n] = np.outer(ramp, H[fast] @ F)
+    # Process noise and the noise of the fast reading enter the sensors, the reading and, through its slope, the filter.
+    enter = np.zeros((held + 1, n + 1))
+    enter[:n, :n], enter[z] = np.eye(n), [*H[fast], 1.0]
+    enter[n:z] = np.outer(ramp, enter[z])
+    noise = enter @ np.block([[Q, np.zeros((n, 1))], [np.zeros((1, n)), model.R[fast]]]) @ enter.T
+    take = np.eye(held + 1)
+    take[held, :n], take[held, held] = H[slow], 0.0
+    if paths.innovate:
+        take[held, n:z], take[held, z] = -paths.H, -paths.J
+    due = take @ noise @ take.T
+    due[held, held] += model.R[slow]
+    pause = model.strides[slow] - 1
+    read = np.zeros(held + 1)
+    read[n:z], read[z] = paths.C, paths.D
+    return [take @ move, *[move] * pause], [due, *[noise] * pause], read

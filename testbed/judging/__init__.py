@@ -1,0 +1,1 @@
+"""A run, or a record, against what it should be."""

@@ -1,0 +1,1 @@
+"""Accumulators: arrays in, numbers out. Errors, consistency of claims, spectra."""

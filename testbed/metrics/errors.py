@@ -1,0 +1,201 @@
+"""Errors of readings and estimates against the truth, accumulated block by block."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from testbed.signals import FloatArray
+
+
+class ErrorMetrics:
+    r"""Error of one rate signal against the truth at the same instants.
+
+    .. math:: \mathrm{rmse}^2 = \langle e^2 \rangle, \qquad
+        \mathrm{rmse\_aligned}^2 = \langle r^2 \rangle + \sum_i A_i^2 (|g_i| - 1)^2 / 2
+
+    with e = estimate - truth, r what is left of e after the least-squares fit of the commanded lines, A_i the amplitude
+    of the truth and g_i = estimate/truth the complex gain at line i. Only sums are kept (normal equations), so memory
+    does not grow with duration; they are added block by block, so that another division into blocks changes the last
+    digits only (below 1e-9 relative).
+
+    Parameters
+    ----------
+    lines : sequence of float
+        Commanded line frequencies [Hz].
+    gaps : bool, optional
+        NaN estimates are lost readings: left out and counted as `missing`. Otherwise they leave the result undefined.
+    """
+
+    def __init__(self, lines: Sequence[float], *, gaps: bool = False) -> None:
+        self._lines = tuple(lines)
+        self._gaps, self._missing = gaps, 0
+        n = 2 * len(self._lines)
+        self._n = 0
+        self._square = 0.0
+        self._peak = 0.0
+        self._gram = np.zeros((n, n))
+        self._with_error = np.zeros(n)
+        self._with_truth = np.zeros(n)
+        self._variance = 0.0
+        self._inside = 0
+
+    def add(self, t: FloatArray, estimate: FloatArray, truth: FloatArray, std: FloatArray | None = None) -> None:
+        """Add samples.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n_time,)
+            Time [s].
+        estimate, truth : ndarray, shape (n_time,)
+            Rates [rad/s].
+        std : ndarray, shape (n_time,), optional
+            Standard deviation that the filter claims [rad/s].
+        """
+        if self._gaps:
+            there = ~np.isnan(estimate)
+            self._missing += int(t.size - np.count_nonzero(there))
+            t, estimate, truth = t[there], estimate[there], truth[there]
+        if not t.size:
+            return
+        error = estimate - truth
+        self._n += t.size
+        self._square += float(error @ error)
+        self._peak = max(self._peak, float(np.max(np.abs(error))))
+        if self._lines:
+            basis = np.concatenate([f(2.0 * np.pi * line * t)[None] for line in self._lines for f in (np.cos, np.sin)])
+            self._gram += basis @ basis.T
+            self._with_error += basis @ error
+            self._with_truth += basis @ truth
+        if std is not None:
+            self._variance += float(std @ std)
+            self._inside += int(np.count_nonzero(np.abs(error) <= 2.0 * std))
+
+    def result(self) -> dict[str, Any]:
+        """Return the metrics in deg/s and degrees, None where undefined; `missing` is the number of lost readings."""
+        missing = {"missing": self._missing} if self._gaps else {}
+        if not self._n:
+            return {"rmse_deg_s": None, "rmse_aligned_deg_s": None, "peak_error_deg_s": None, "lines": [], **missing}
+        gains = self._gains()
+        rest = self._rest() if self._lines else 0.0
+        return {
+            "rmse_deg_s": finite(np.rad2deg(np.sqrt(self._square / self._n))),
+            "rmse_aligned_deg_s": self._aligned(gains, rest),
+            "peak_error_deg_s": finite(np.rad2deg(self._peak)),
+            "lines": [
+                {
+                    "frequency_hz": line,
+                    "gain": None if g is None else finite(abs(g)),
+                    "phase_deg": None if g is None else finite(np.angle(g, deg=True)),
+                    "error_deg_s": None if g is None else finite(np.rad2deg(_hypot(rest, a * abs(g - 1.0)))),
+                }
+                for line, (a, g) in zip(self._lines, gains, strict=True)
+            ],
+            **missing,
+        }
+
+    def consistency(self) -> dict[str, Any]:
+        """Return the claimed standard deviation (root mean square) and the share of errors within two of it."""
+        if not self._n:
+            return {"mean_std_deg_s": None, "inside_2_std": None}
+        return {
+            "mean_std_deg_s": finite(np.rad2deg(np.sqrt(self._variance / self._n))),
+            "inside_2_std": self._inside / self._n,
+        }
+
+    def truth_lines(self) -> list[tuple[float, float]]:
+        """Return frequency [Hz] and amplitude [rad/s] of the commanded lines in the truth; none without samples or
+        lines.
+        """
+        if not self._n:
+            return []
+        return [(line, amplitude) for line, (amplitude, _) in zip(self._lines, self._gains(), strict=True)]
+
+    def _gains(self) -> list[tuple[float, complex | None]]:
+        """Return amplitude of the truth and complex gain estimate/truth of each line."""
+        if not self._lines:
+            return []
+        truth = _phasors(self._gram, self._with_truth)
+        error = _phasors(self._gram, self._with_error)
+        # A line that is not in the truth (a fixed table) has no gain: below 1e-9 deg/s it is arithmetic noise.
+        return [(abs(c), 1.0 + e / c if abs(c) > np.deg2rad(1e-9) else None) for c, e in zip(truth, error, strict=True)]
+
+    def _rest(self) -> float:
+        """Return the mean square of the error once the lines are fitted out [rad^2/s^2]."""
+        fit, *_ = np.linalg.lstsq(self._gram, self._with_error, rcond=None)
+        rest = (self._square - 2.0 * fit @ self._with_error + fit @ self._gram @ fit) / self._n
+        return max(float(rest), 0.0)
+
+    def _aligned(self, gains: list[tuple[float, complex | None]], rest: float) -> float | None:
+        if not gains or any(g is None for _, g in gains):
+            return None
+        lines = sum(a**2 * (abs(g) - 1.0) ** 2 / 2.0 for a, g in gains if g is not None)
+        return finite(np.rad2deg(np.sqrt(rest + lines)))
+
+
+def _hypot(rest: float, amplitude: float) -> float:
+    """Return the rms of a sine and something else of the mean square `rest`."""
+    return float(np.sqrt(rest + 0.5 * amplitude**2))
+
+
+def _phasors(gram: FloatArray, projection: FloatArray) -> list[complex]:
+    """Return c = p - j q of each fitted p cos + q sin, so that the line is Re(c exp(j w t))."""
+    fit, *_ = np.linalg.lstsq(gram, projection, rcond=None)
+    return [complex(p, -q) for p, q in fit.reshape(-1, 2)]
+
+
+def finite(value: Any) -> float | None:
+    """Return a number, or None where it is undefined: metrics.json never holds NaN.
+
+    Parameters
+    ----------
+    value : float
+        Any unit.
+    """
+    return float(value) if np.isfinite(value) else None
+
+
+def floor_density(psds: Sequence[Callable[[FloatArray], FloatArray]], freq_hz: FloatArray) -> FloatArray:
+    """Return the two-sided density [rad^2/s] that the best combination of all sensors leaves: 1 / sum of 1/S_i.
+
+    Parameters
+    ----------
+    psds : sequence of callable
+        Input-referred two-sided noise density of each sensor, Hz -> rad^2/s; inf where it is blind.
+    freq_hz : ndarray, shape (n_freq,)
+        Frequencies [Hz].
+    """
+    information = np.zeros_like(freq_hz)
+    for psd in psds:
+        information += 1.0 / psd(freq_hz)
+    with np.errstate(divide="ignore"):
+        floor: FloatArray = 1.0 / information
+    return floor
+
+
+def floor_rmse(psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float) -> float | None:
+    r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_0^W df / \sum_i 1/S_i}`
+    [rad/s].
+
+    Non-causal; None if no sensor sees some part of the band. The integral runs over ln f from 1e-6 Hz, 200 points per
+    decade (trapezoid); below that the density is taken as constant.
+
+    Parameters
+    ----------
+    psds : sequence of callable
+        Input-referred two-sided noise density of each sensor, Hz -> rad^2/s.
+    bandwidth_hz : float
+        W [Hz].
+    """
+    if not psds:
+        return None
+    decades = np.log10(bandwidth_hz) + 6.0
+    freq = np.logspace(-6.0, np.log10(bandwidth_hz), max(int(200 * decades), 2))
+    density = floor_density(psds, freq)
+    if not np.all(np.isfinite(density)):
+        return None
+    return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + density[0] * freq[0])))

@@ -1,0 +1,382 @@
+"""The air-bearing turntable: commanded motion in, true inertial rates out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from testbed.errors import RunError
+from testbed.models.turntable import modes as table_modes
+from testbed.models.turntable import plant, servo, stepping
+from testbed.models.turntable.digital import DigitalLoop, check_loop
+from testbed.models.turntable.disturbances import Disturbances, check_floor
+from testbed.models.turntable.engine import Engine
+from testbed.models.turntable.parameters import Cogging, Mounting, TurntableParameters
+from testbed.models.turntable.servo import required_torque
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from testbed.models.motion import CommandBlock
+    from testbed.models.turntable.earth import EarthRate
+    from testbed.models.turntable.floor import FloorMotion
+    from testbed.signals import FloatArray
+
+    Poses = dict[str, tuple[FloatArray, FloatArray]]
+
+__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
+
+
+@dataclass(frozen=True)
+class TruthBlock:
+    """What the table really did over `n_time` steps, at t_k = k / sample_rate for k = start ... start + n_time - 1.
+
+    Parameters
+    ----------
+    start : int
+        Index k of the first sample.
+    rate : ndarray, shape (n_time,)
+        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor; with the Earth's if asked
+        for.
+    angle : ndarray, shape (n_time,)
+        Angle about the vertical, spindle plus platform yaw, not wrapped [rad]; without the Earth's.
+    sensor_rate : dict of str to ndarray, shape (n_time,)
+        What each sensor's own axis feels [rad/s].
+    encoder_rate : ndarray, shape (n_time,)
+        Rate of the rotor relative to the platform [rad/s]: differs from `rate` by the recoil of the platform.
+    torque : ndarray, shape (n_time,)
+        Motor torque [N m].
+    poses : dict of str to tuple of ndarray, shapes (n_pose, 3), (n_pose, 4)
+        Body name to positions [m] and unit quaternions (w, x, y, z) at the samples with k % pose_stride == 0.
+    cross_rate : dict of str to ndarray, shape (n_time, 2)
+        Inertial rates about the housing's x and y axes [rad/s], of the exposed sensors.
+    specific_force : dict of str to ndarray, shape (n_time, 3)
+        Acceleration minus gravity at the mounting along the housing's axes [m/s^2], of the exposed sensors.
+    """
+
+    start: int
+    rate: FloatArray
+    angle: FloatArray
+    sensor_rate: dict[str, FloatArray]
+    encoder_rate: FloatArray
+    torque: FloatArray
+    poses: Poses
+    cross_rate: dict[str, FloatArray] = field(default_factory=dict)
+    specific_force: dict[str, FloatArray] = field(default_factory=dict)
+
+
+class Turntable:
+    """The turntable in time.
+
+    State is kept between blocks; any division into blocks gives the same bits. Memory goes with the block, not with the
+    run. The table starts at the commanded angle and rate, its mounts and bearing in static equilibrium under gravity.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Of the plant; `mode` chooses what moves.
+    mountings : mapping of str to Mounting
+        Sensor name to its place on the table.
+    sample_rate_hz : float, optional
+        Base clock [Hz]: commands are held over its steps.
+    substeps : int, optional
+        Integration steps per step of the base clock, with the same held commands.
+    holds : int, optional
+        Steps of the base clock per integration step; then `process` needs a look ahead over `lookahead` steps.
+    pose_stride : int, optional
+        Steps between two poses.
+    exposed : collection of str, optional
+        Sensors whose cross rates and specific forces are wanted too.
+    floor : FloorMotion, optional
+        The realisation of `parameters.floor`; needed if that floor moves.
+
+    Raises
+    ------
+    ScenarioError
+        If the plant cannot be built, falls over, is too stiff for the step, or its digital servo is unstable.
+    ValueError
+        If the floor moves and `floor` is not given.
+    """
+
+    def __init__(
+        self,
+        parameters: TurntableParameters,
+        mountings: Mapping[str, Mounting],
+        sample_rate_hz: float = 20000.0,
+        *,
+        substeps: int = 1,
+        holds: int = 1,
+        pose_stride: int = 400,
+        exposed: Collection[str] = (),
+        floor: FloorMotion | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self._dt = 1.0 / sample_rate_hz
+        check_plant(parameters, sample_rate_hz, substeps, holds)
+        self.model = plant.build(parameters, mountings, self._dt * holds / substeps, exposed)
+        self._data = mujoco.MjData(self.model)
+        self._motor = int(self.model.actuator_ctrladr[self.model.actuator(plant.MOTOR).id])
+        self._mountings, self._names, self._exposed = dict(mountings), tuple(mountings), tuple(exposed)
+        self._substeps, self._holds, self._stride = substeps, holds, pose_stride
+        self.lookahead = stepping.lookahead(holds) if parameters.mode != "fixed" else 0
+        self._next: int | None = None
+        self._engine: Engine | DigitalLoop | None = None
+        self._long: stepping.LongSteps | None = None
+        self._disturbances = (
+            Disturbances(self.model, parameters, floor, sample_rate_hz) if parameters.has_plant else None
+        )
+        # The axis of each site on the table at angle 0: what turns with it in mode `fixed`.
+        self._axes = {name: plant.rotation(self.model.site(name).quat)[:, 2] for name in (plant.AXIS, *mountings)}
+
+    def process(self, command: CommandBlock, ahead: CommandBlock | None = None) -> TruthBlock:
+        """Follow the command over its steps.
+
+        Parameters
+        ----------
+        command : CommandBlock
+            The steps after those of the call before [rad/s, rad].
+        ahead : CommandBlock, optional
+            The `lookahead` steps behind them, for integration steps of several holds.
+
+        Returns
+        -------
+        TruthBlock
+            At the beginning of each of these steps.
+
+        Raises
+        ------
+        RunError
+            If the command is not finite, the motor saturates or the plant diverges: what and at which time.
+        ValueError
+            If the block does not follow the one before.
+        """
+        if self._next not in {None, command.start}:
+            msg = f"start: expected {self._next}, the sample after the last block, got {command.start}"
+            raise ValueError(msg)
+        self._check_finite(command)
+        self._next = command.start + command.n_time
+        if self.parameters.mode == "fixed":
+            return self._fixed(command)
+        return self._truth(command, self._simulate(command) if self._holds == 1 else self._leap(command, ahead))
+
+    def _simulate(self, command: CommandBlock) -> FloatArray:
+        if self._engine is None:
+            self._engine = self._start(command)
+        control = self._control(command)
+        if isinstance(self._engine, DigitalLoop):
+            return self._engine.advance(command.start, control, command.angle[:-1])
+        return self._engine.advance(command.start, control)
+
+    def _leap(self, command: CommandBlock, ahead: CommandBlock | None) -> FloatArray:
+        """Return the sensor rows of integration steps that span several holds."""
+        if ahead is None or ahead.n_time != self.lookahead:
+            msg = f"ahead: expected {self.lookahead} steps behind the block, got {ahead and ahead.n_time}"
+            raise ValueError(msg)
+        held = self._control(command)
+        control = np.concatenate([held, self._control(ahead)])
+        if self._long is None:
+            self._long = self._start_long(command, control)
+        rows = self._long.advance(command.start, command.n_time, control)
+        # The torque follows the held references also within a step.
+        entry = self.model.sensor("torque").adr[0]
+        rows[:, entry] = held[:, self._motor]
+        if self.parameters.mode != "ideal":
+            q, v = self._column(f"q_{plant.SPINDLE}", rows), self._column("encoder_rate", rows)
+            reference = held[:, self._motor : self._motor + 3]
+            rows[:, entry] = servo.motor_torque(self.parameters, reference, q, v)
+        return rows
+
+    def _truth(self, command: CommandBlock, rows: FloatArray) -> TruthBlock:
+        self._check_motor(command.start, self._column("torque", rows))
+        angles = rows[:, : self.model.nq]
+        yaw = self._column("q_platform_rz", rows) if self.parameters.has_plant else 0.0
+        return TruthBlock(
+            start=command.start,
+            rate=self._rate(plant.AXIS, rows),
+            angle=self._column(f"q_{plant.SPINDLE}", rows) + yaw,
+            sensor_rate={name: self._rate(name, rows) for name in self._names},
+            encoder_rate=self._column("encoder_rate", rows),
+            torque=self._column("torque", rows),
+            poses=self._poses(command.start, angles),
+            cross_rate={name: self._cross_rate(name, rows) for name in self._exposed},
+            specific_force={name: self._columns(f"force_{name}", rows) for name in self._exposed},
+        )
+
+    def _fixed(self, command: CommandBlock) -> TruthBlock:
+        rate, angle = command.rate[:-1].copy(), command.angle[:-1].copy()
+        # A rate about the vertical, seen along a tilted axis.
+        felt = {name: axis[2] * rate for name, axis in self._axes.items()}
+        if self.parameters.earth_rate is not None:
+            for name, axis in self._axes.items():
+                felt[name] += _along(self.parameters.earth_rate, _turned(axis, angle))
+        surroundings = {name: self._fixed_surroundings(name, command) for name in self._exposed}
+        return TruthBlock(
+            start=command.start,
+            rate=felt.pop(plant.AXIS),
+            angle=angle,
+            sensor_rate=felt,
+            encoder_rate=rate,
+            torque=np.zeros(command.n_time),
+            poses=self._poses(command.start, angle[:, None]),
+            cross_rate={name: cross for name, (cross, _) in surroundings.items()},
+            specific_force={name: force for name, (_, force) in surroundings.items()},
+        )
+
+    def _fixed_surroundings(self, name: str, command: CommandBlock) -> tuple[FloatArray, FloatArray]:
+        """Return cross rates and specific force of a mounting that turns about the vertical and does nothing else."""
+        x, y, _ = self._mountings[name].position
+        rate, acceleration = command.rate[:-1], np.diff(command.rate) / self._dt
+        force = [
+            -acceleration * y - rate**2 * x,
+            acceleration * x - rate**2 * y,
+            np.full(rate.size, self.parameters.gravity),
+        ]
+        to_table = plant.rotation(self.model.site(name).quat)
+        turned: FloatArray = (to_table.T[:, :, None] * np.array(force)).sum(axis=1).T
+        cross: FloatArray = rate[:, None] * to_table[2, :2]
+        if self.parameters.earth_rate is not None:
+            for i in range(2):
+                cross[:, i] += _along(self.parameters.earth_rate, _turned(to_table[:, i], command.angle[:-1]))
+        return cross, turned
+
+    def _start_long(self, command: CommandBlock, control: FloatArray) -> stepping.LongSteps:
+        data, qvel = self._at_start(command)
+        acceleration, sensed = stepping.responses(self.model, data)
+        qvel += stepping.LongSteps.initial(acceleration, control, self._holds, self._dt)
+        engine = Engine(self.model, data.qpos, qvel, self._substeps)
+        return stepping.LongSteps(engine, sensed, self._holds, self._dt)
+
+    def _start(self, command: CommandBlock) -> Engine | DigitalLoop:
+        data, qvel = self._at_start(command)
+        if self.parameters.mode == "digital":
+            return DigitalLoop(self.model, data.qpos, qvel, self._substeps, self.parameters)
+        return Engine(self.model, data.qpos, qvel, self._substeps)
+
+    def _at_start(self, command: CommandBlock) -> tuple[Any, FloatArray]:
+        """Return the table in its equilibrium at the commanded angle, and its first velocities."""
+        parameters, angle = self.parameters, command.angle[0]
+        # The analogue servo holds the table at rest, so that its equilibrium is one of springs alone.
+        analogue = parameters.model_copy(update={"mode": "servo"})
+        rest = plant.build(analogue, {}, self._dt) if parameters.mode == "digital" else self.model
+        data = mujoco.MjData(rest)
+        spindle = rest.joint(plant.SPINDLE).qposadr[0]
+        data.qpos[spindle] = angle
+        if self._disturbances is not None:
+            data.ctrl[rest.actuator_ctrladr[rest.actuator(plant.MOTOR).id]] = angle
+            self._disturbances.at_start(data.ctrl, angle)
+            table_modes.settle(rest, data)
+        qvel = np.zeros(self.model.nv)
+        qvel[spindle] = command.rate[0]
+        return data, qvel
+
+    def _control(self, command: CommandBlock) -> FloatArray:
+        control = np.zeros((command.n_time, self.model.nu))
+        parameters = self.parameters
+        if parameters.mode == "ideal":
+            control[:, self._motor] = servo.exact_torque(parameters, command.rate, self._dt)
+        elif parameters.mode == "digital":
+            control[:, self._motor] = servo.feed_forward(parameters, command, self._dt)
+        else:
+            control[:, self._motor] = command.angle_mid
+            control[:, self._motor + 1] = command.rate_mid
+            control[:, self._motor + 2] = servo.feed_forward(parameters, command, self._dt)
+        if self._disturbances is not None:
+            self._disturbances.apply(control, command.start, command.angle_mid, command.rate_mid)
+        return control
+
+    def _rate(self, site: str, rows: FloatArray) -> FloatArray:
+        """Return the inertial rate about the z axis of a site, the Earth's included where it is asked for."""
+        rate = self._column(f"rate_{site}", rows)
+        if self.parameters.earth_rate is not None:
+            first = self.model.sensor(f"axis_{site}").adr[0]
+            rate += _along(self.parameters.earth_rate, rows[:, first : first + 3].T)
+        return rate
+
+    def _cross_rate(self, site: str, rows: FloatArray) -> FloatArray:
+        """Return the inertial rates about the x and y axes of a site, shape (n_time, 2), the Earth's included."""
+        cross = self._columns(f"rate_{site}", rows)[:, :2]
+        if self.parameters.earth_rate is not None:
+            for i, axis in enumerate(("axis_x", "axis_y")):
+                cross[:, i] += _along(self.parameters.earth_rate, self._columns(f"{axis}_{site}", rows).T)
+        return cross
+
+    def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
+        """Return the last component of a sensor: the value of a scalar, the z of an angular velocity."""
+        entry = self.model.sensor(sensor)
+        return rows[:, entry.adr[0] + entry.dim[0] - 1].copy()
+
+    def _columns(self, sensor: str, rows: FloatArray) -> FloatArray:
+        """Return all components of a sensor, shape (n_time, n_component)."""
+        entry = self.model.sensor(sensor)
+        return rows[:, entry.adr[0] : entry.adr[0] + entry.dim[0]].copy()
+
+    def _poses(self, start: int, qpos: FloatArray) -> Poses:
+        """Return where the bodies are at the pose samples, from joint positions, shape (n_time, nq)."""
+        picked = qpos[-start % self._stride :: self._stride]
+        ids = [self.model.body(name).id for name in plant.BODIES]
+        places, turns = np.empty((len(picked), len(ids), 3)), np.empty((len(picked), len(ids), 4))
+        for i, q in enumerate(picked):
+            self._data.qpos[:] = q
+            mujoco.mj_kinematics(self.model, self._data)
+            places[i], turns[i] = self._data.xpos[ids], self._data.xquat[ids]
+        return {name: (places[:, i].copy(), turns[:, i].copy()) for i, name in enumerate(plant.BODIES)}
+
+    def _check_finite(self, command: CommandBlock) -> None:
+        for name in ("rate", "angle", "rate_mid", "angle_mid"):
+            bad = ~np.isfinite(getattr(command, name))
+            if bad.any():
+                t = (command.start + int(np.argmax(bad))) * self._dt
+                value = getattr(command, name)[bad][0]
+                msg = f"turntable: expected a finite command, got {name} = {value} at t = {t:.6g} s"
+                raise RunError(msg)
+
+    def _check_motor(self, start: int, torque: FloatArray) -> None:
+        limit = self.parameters.torque_limit
+        saturated = np.abs(torque) >= limit
+        if self.parameters.mode == "servo" and saturated.any():
+            t = (start + int(np.argmax(saturated))) * self._dt
+            msg = f"turntable: the motor saturated at its {limit:g} N*m at t = {t:.6g} s; the run got this far"
+            raise RunError(msg)
+
+
+def check_plant(parameters: TurntableParameters, sample_rate_hz: float, substeps: int = 1, holds: int = 1) -> None:
+    """Refuse a table that cannot be run: unstable, too stiff for the step, or faster than the clock.
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Of the plant; modes without one are always accepted.
+    sample_rate_hz : float
+        Base clock [Hz].
+    substeps, holds : int, optional
+        Integration steps per step of the base clock, and steps of the base clock per integration step.
+
+    Raises
+    ------
+    ScenarioError
+        Saying what was expected.
+    """
+    if not parameters.has_plant:
+        return
+    table_modes.check_modes(parameters, holds / sample_rate_hz / substeps)
+    check_floor(parameters, sample_rate_hz)
+    if parameters.mode == "digital":
+        check_loop(parameters, sample_rate_hz)
+
+
+def _along(earth: EarthRate, axis: FloatArray) -> FloatArray:
+    """Return the Earth's rate along an axis, shape (3, n_time); shape (n_time,). MuJoCo's laboratory does not turn."""
+    x, y, z = earth.vector
+    # No matrix product: its order of additions depends on the length of the block.
+    rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+    return rate
+
+
+def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return an axis, shape (3,), turned about the vertical by angles, shape (n_time,); shape (3, n_time)."""
+    x, y, z = axis
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y, np.full_like(c, z)])

@@ -1,0 +1,1 @@
+"""How this project draws and prints: colours, numbers, axes, SVG and HTML. It knows nothing of runs."""

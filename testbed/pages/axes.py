@@ -1,0 +1,111 @@
+"""What the figures of a report share: envelopes, legend and margins, units and the axis of time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+
+from testbed.pages.numbers import decade, plain, significant
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    from testbed.pages.envelope import Envelope
+
+WIDTH_IN = 9.2
+DEGREE = float(np.degrees(1.0))
+# Slower than this is read in deg/h [rad/s]; a little faster than the Earth.
+SLOW = np.radians(20.0) / 3600.0
+# Longer than this is read in hours [s].
+HOURS_FROM = 7200.0
+# Hours between two marks, the first that leaves at most twelve of them.
+HOUR_STEPS = (0.5, 1.0, 2.0, 3.0, 6.0, 12.0, 24.0)
+
+
+def draw(axes: Axes, envelope: Envelope, color: str, width: float, alpha: float = 1.0, scale: float = DEGREE) -> None:
+    """Fill between the extremes, times `scale`, with an outline so that a quiet signal is still a line."""
+    low, high = scale * envelope.low, scale * envelope.high
+    axes.fill_between(
+        envelope.time, low, high, facecolor=color, edgecolor=color, linewidth=width, alpha=alpha, joinstyle="round"
+    )
+
+
+def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:
+    """Put the legend above the axes, in equal rows as wide as its longest name allows, and set the margins in inches.
+
+    Solving for the layout would cost as much time as drawing the figure.
+    """
+    entry_pt = 45.0 + 5.4 * max(len(str(handle.get_label())) for handle in handles)
+    n_rows = -(-len(handles) // max(1, int(72.0 * WIDTH_IN / entry_pt)))
+    width, height = figure.get_size_inches()
+    top = height - 0.08 - 0.2 * n_rows
+    figure.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, top / height),
+        ncols=-(-len(handles) // n_rows),
+        borderaxespad=0.0,
+    )
+    rows = len(figure.axes)
+    each = (top - 0.3 - 0.48) / rows
+    figure.subplots_adjust(
+        left=0.82 / width,
+        right=1.0 - 0.14 / width,
+        bottom=0.48 / height,
+        top=(top - 0.3) / height,
+        hspace=min(gap_in / max(each - gap_in, 0.1), 1.0),
+    )
+
+
+def label(group: str) -> str:
+    """Return the instance's name; a dollar sign would start a formula."""
+    return group.split("/", 1)[-1].replace("$", r"\$")
+
+
+def rate_unit(highest: float) -> tuple[str, float]:
+    """Return the unit for rates up to `highest` [rad/s] and what a rate in rad/s is multiplied by for it."""
+    return ("deg/h", 3600.0 * DEGREE) if 0.0 < highest < SLOW else ("deg/s", DEGREE)
+
+
+def decade_axis(axes: Axes) -> None:
+    """Label the powers of ten of a logarithmic y axis whose limits stand, and 2 and 5 times them where fewer than two
+    are seen.
+
+    Not by matplotlib's own formatter: its typesetting of powers takes a quarter of the time of the whole report.
+
+    Parameters
+    ----------
+    axes : Axes
+        Whose y axis it is.
+    """
+    low, high = np.log10(axes.get_ylim())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    if np.floor(high) - np.ceil(low) < 1.0:
+        axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: significant(value, 1)))
+
+
+def time_axis(axes: Axes, span_s: float, *, named: bool = True) -> None:
+    """Mark the axis of time, whose data are seconds: in hours if it spans two or more.
+
+    Parameters
+    ----------
+    axes : Axes
+        Whose x axis it is.
+    span_s : float
+        What it shows [s].
+    named : bool
+        Whether it gets a label.
+    """
+    if span_s >= HOURS_FROM:
+        step = next((h for h in HOUR_STEPS if span_s <= 12.0 * 3600.0 * h), span_s / 3600.0)
+        axes.xaxis.set_major_locator(MultipleLocator(3600.0 * step))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value / 3600.0)))
+    if named:
+        axes.set_xlabel("time [h]" if span_s >= HOURS_FROM else "time [s]")

@@ -1,0 +1,87 @@
+"""What one block of a run holds, and the one list of what a run keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from testbed.fusion import EstimateBlock
+    from testbed.models.motion import CommandBlock
+    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class RunBlock:
+    """Everything that one block of the chain produced.
+
+    Parameters
+    ----------
+    start : int
+        Index of its first base sample.
+    command, truth : CommandBlock, TruthBlock
+        What was commanded and what happened.
+    sensors : mapping
+        Readings [rad/s] by sensor, those that fall due in the block.
+    fusion : mapping
+        Estimates by filter.
+    profiles : mapping
+        By MHD sensor: heights [m], shape (n_height,), and velocity profiles at the pose samples, shape (n_pose,
+        n_height).
+    temperatures, drifts : mapping
+        By sensor with a thermometer inside: its readings [K], as many as of the rate, and the true thermal bias
+        [rad/s].
+    """
+
+    start: int
+    command: CommandBlock
+    truth: TruthBlock
+    sensors: Mapping[str, FloatArray]
+    fusion: Mapping[str, EstimateBlock]
+    profiles: Mapping[str, tuple[FloatArray, FloatArray]]
+    temperatures: Mapping[str, FloatArray] = field(default_factory=dict)
+    drifts: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def n_time(self) -> int:
+        """Number of base samples."""
+        return self.command.n_time
+
+
+def columns(block: RunBlock, rates: Mapping[str, float]) -> Iterator[tuple[str, str, int, float, FloatArray]]:
+    """Yield every signal of a block as (group, name, start index, sample rate [Hz], values): the one list of what a run
+    keeps.
+
+    Parameters
+    ----------
+    block : RunBlock
+        A block of the chain.
+    rates : mapping
+        Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
+    """
+    base = rates["base"]
+    n = block.n_time
+    yield "commanded", "rate", block.start, base, block.command.rate[:n]
+    yield "truth", "rate", block.start, base, block.truth.rate
+    yield "truth", "angle", block.start, base, block.truth.angle
+    for name, values in block.truth.sensor_rate.items():
+        yield "truth", f"{name}_rate", block.start, base, values
+    for name, values in block.drifts.items():
+        yield "truth", f"{name}_drift", block.start, base, values
+    for name, values in block.sensors.items():
+        start = first_due(block.start, base, rates[name])
+        yield f"sensors/{name}", "rate", start, rates[name], values
+        if name in block.temperatures:
+            yield f"sensors/{name}", "temperature", start, rates[name], block.temperatures[name]
+    for name, estimate in block.fusion.items():
+        start = first_due(block.start, base, rates[name])
+        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
+            yield f"fusion/{name}", signal, start, rates[name], values
+
+
+def first_due(start: int, base_rate_hz: float, sample_rate_hz: float) -> int:
+    """Return the index of the first sample of a slower clock that falls on or after base sample `start`."""
+    return -(-start // round(base_rate_hz / sample_rate_hz))

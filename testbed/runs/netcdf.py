@@ -1,0 +1,146 @@
+"""run.nc: every signal of a run as NetCDF-4, written block by block."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import h5netcdf
+import numpy as np
+
+from testbed.fusion.base import diagnostic_unit
+from testbed.runs.block import columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from testbed.runs.block import RunBlock
+
+_CHUNK = 20_000
+_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s", "temperature": "K"}
+
+
+class _ShieldedFile(io.FileIO):
+    """A file whose failures HDF5 never sees: it crashes the process when a write fails while it closes. `error` is the
+    first one.
+    """
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        done = 0
+        try:
+            while self.error is None and done < view.nbytes:
+                done += super().write(view[done:])
+        except OSError as error:
+            self.error = error
+        return int(view.nbytes)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise the first failure."""
+        if self.error is not None:
+            raise self.error
+
+
+class NetcdfStore:
+    """Writes every signal of a run to run.nc (NetCDF-4, compressed), block by block.
+
+    Rates and angles are float64, diagnostics float32; every group has the coordinate `time` in seconds.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rates : mapping
+        Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
+    duration : float
+        Length of the run [s].
+    attributes : mapping
+        Provenance, written as global attributes.
+
+    Raises
+    ------
+    OSError
+        From `write` and `close`, if the disk is full or the file cannot be written.
+    """
+
+    def __init__(self, path: Path, rates: Mapping[str, float], duration: float, attributes: Mapping[str, Any]) -> None:
+        self._rates = rates
+        self._n_base = round(duration * rates["base"])
+        self._raw = _ShieldedFile(path, "w+")
+        self._file = h5netcdf.File(self._raw, "w")
+        self._variables: dict[tuple[str, str], Any] = {}
+        for name, value in attributes.items():
+            self._file.attrs[name] = value
+
+    def write(self, block: RunBlock) -> None:
+        """Append a block."""
+        for group, name, start, rate, values in columns(block, self._rates):
+            if (group, name) not in self._variables:
+                self._create(group, name, rate)
+            if values.size:
+                self._variables[group, name][start : start + values.size] = values
+        self._raw.check()
+
+    def close(self) -> None:
+        """Finish the file; OSError if anything could not be written."""
+        if not self._raw.closed:
+            self._file.close()
+            self._raw.close()
+            self._raw.check()
+
+    def _create(self, group: str, name: str, rate: float) -> None:
+        n = -(-self._n_base // round(self._rates["base"] / rate))
+        node = self._group(group)
+        if "time" not in node.variables:
+            node.dimensions["time"] = n
+            time = self._variable(node, "time", n, np.float64)
+            for start in range(0, n, _CHUNK):
+                stop = min(start + _CHUNK, n)
+                time[start:stop] = np.arange(start, stop) / rate
+            node.attrs["sample_rate_hz"] = rate
+        precise = name in _UNITS or is_sensor_truth(name)
+        self._variables[group, name] = self._variable(node, name, n, np.float64 if precise else np.float32)
+
+    def _group(self, path: str) -> Any:
+        node = self._file
+        for name in path.split("/"):
+            node = node.groups[name] if name in node.groups else node.create_group(name)
+        return node
+
+    def _variable(self, node: Any, name: str, n: int, kind: type) -> Any:
+        variable = node.create_variable(
+            name,
+            ("time",),
+            kind,
+            chunks=(min(_CHUNK, n),),
+            compression="gzip",
+            compression_opts=1,
+            shuffle=True,
+            fillvalue=np.nan,
+        )
+        variable.attrs["units"] = unit_of(name)
+        return variable
+
+
+def unit_of(name: str) -> str:
+    """Return the SI unit of a signal by its name."""
+    if name in _UNITS:
+        return _UNITS[name]
+    return _UNITS["rate"] if is_sensor_truth(name) else diagnostic_unit(name)
+
+
+def is_sensor_truth(name: str) -> bool:
+    """Return whether a signal is what a sensor's axis feels, named ``<sensor>_rate``, or its thermal bias,
+    ``<sensor>_drift``.
+    """
+    return name.endswith(("_rate", "_drift")) and name != "Q_rate"

@@ -1,0 +1,160 @@
+"""Checks between the parts of a scenario: what each part alone cannot know."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.errors import ScenarioError
+from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.turntable import check_plant
+from testbed.scenario.model import METRICS
+from testbed.scenario.step_choice import given_step
+
+if TYPE_CHECKING:
+    from testbed.scenario.document import Document
+    from testbed.scenario.model import Scenario
+
+_BLOCK = 20_000
+
+
+def cross_check(scenario: Scenario, document: Document) -> None:
+    """Note in `document` everything that does not fit together in `scenario`."""
+    _check_times(scenario, document)
+    _check_clocks(scenario, document)
+    _check_expectations(scenario, document)
+    _check_plant(scenario, document)
+    _check_filters(scenario, document)
+    if not document.problems:
+        _check_motion(scenario, document)
+
+
+def _check_times(scenario: Scenario, document: Document) -> None:
+    frame = scenario.frame
+    if frame.settle >= frame.duration:
+        document.find(
+            ("settle",),
+            f"expected less than the duration {frame.duration:g} s, got {frame.settle:g} s: no time is left for the metrics",
+        )
+    base = scenario.base_rate_hz
+    if scenario.n_time < 1 or abs(scenario.n_time / base - frame.duration) > 1e-9 * frame.duration:
+        document.find(
+            ("duration",), f"expected a multiple of the base step {1e6 / base:g} us, got {frame.duration!r} s"
+        )
+    if frame.detail is not None and not frame.detail[0] < frame.detail[1] <= frame.duration:
+        document.find(
+            ("detail",),
+            f"expected a start before the end, within the run, got {frame.detail[0]:g} s ... {frame.detail[1]:g} s",
+        )
+
+
+def _check_clocks(scenario: Scenario, document: Document) -> None:
+    base = scenario.base_rate_hz
+    examples = ", ".join(f"{base / n:g} Hz" for n in (1, 2, 4, 5, 10, 20))
+    for name, sensor in scenario.sensors.items():
+        ratio = base / sensor.sample_rate
+        if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 1:
+            document.find(
+                ("sensors", name, "sample_rate"),
+                f"expected {base:g} Hz divided by a whole number ({examples}, ...), got {sensor.sample_rate:g} Hz",
+            )
+    rates = sorted({sensor.sample_rate for sensor in scenario.sensors.values()})
+    for rate in rates[:-1]:
+        if scenario.fusion and abs(rates[-1] / rate - round(rates[-1] / rate)) > 1e-9 * rates[-1] / rate:
+            document.find(
+                ("sensors",),
+                f"expected sample rates that are whole multiples of each other, got {rate:g} Hz and {rates[-1]:g} Hz",
+            )
+    if scenario.fusion and not scenario.sensors:
+        document.find(("fusion",), "there is nothing to fuse: name at least one sensor under 'sensors:'")
+
+
+def _check_plant(scenario: Scenario, document: Document) -> None:
+    parameters = scenario.turntable
+    try:
+        step = given_step(parameters)
+    except ScenarioError as error:
+        document.find(("turntable", "step"), _reasons(error))
+        return
+    try:
+        check_plant(parameters, scenario.base_rate_hz, step.substeps, step.holds)
+    except ScenarioError as error:
+        document.find(("turntable",), _reasons(error))
+
+
+def _reasons(error: ScenarioError) -> str:
+    return "; ".join(problem.message for problem in error.problems)
+
+
+def _check_expectations(scenario: Scenario, document: Document) -> None:
+    subjects = {**scenario.sensors, **scenario.fusion}
+    for bound in scenario.expect:
+        if bound.subject not in subjects:
+            document.find(
+                ("expect", bound.subject), f"is no sensor or filter of this scenario (there are {', '.join(subjects)})"
+            )
+        elif bound.metric not in METRICS:
+            document.find(("expect", bound.subject, bound.metric), f"is no metric (known: {', '.join(METRICS)})")
+
+
+def _check_filters(scenario: Scenario, document: Document) -> None:
+    if document.problems:
+        return
+    rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
+    for name, spec in scenario.fusion.items():
+        try:
+            spec.factory(spec.belief, rates, spec.parameters)
+        except (ValueError, TypeError) as error:
+            document.find(("fusion", name), f"{spec.type}: {error}")
+
+
+def _check_motion(scenario: Scenario, document: Document) -> None:
+    for i, (kind, motion) in enumerate(scenario.motion):
+        try:
+            top = motion.top_frequency()
+        except ScenarioError as error:
+            document.adopt(error)
+            continue
+        for name, sensor in scenario.sensors.items():
+            if top >= sensor.sample_rate / 2:
+                document.find(
+                    ("motion", i, kind),
+                    f"contains {top:g} Hz, but {name} at {sensor.sample_rate:g} Hz sees only what is below {sensor.sample_rate / 2:g} Hz: "
+                    "lower the frequency or raise the sample rate",
+                )
+    if not document.problems:
+        _check_reach(scenario, document)
+
+
+def _check_reach(scenario: Scenario, document: Document) -> None:
+    """Play the commanded motion once, without a plant, and compare its peaks with ranges and torque."""
+    try:
+        peak_rate, peak_torque = command_peaks(scenario)
+    except ScenarioError as error:
+        document.adopt(error)
+        return
+    for name, sensor in scenario.sensors.items():
+        if peak_rate > sensor.full_scale():
+            document.find(
+                ("motion",),
+                f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, +-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
+            )
+    limit = scenario.turntable.torque_limit
+    if scenario.turntable.has_plant and peak_torque > limit:
+        document.find(
+            ("motion",),
+            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'ideal'",
+        )
+
+
+def command_peaks(scenario: Scenario) -> tuple[float, float]:
+    """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
+    motion = scenario.profile()
+    peak_rate = peak_torque = 0.0
+    for start in range(0, scenario.n_time, _BLOCK):
+        command = motion.process(min(_BLOCK, scenario.n_time - start))
+        torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
+        peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
+        peak_torque = max(peak_torque, float(np.max(np.abs(torque))))
+    return peak_rate, peak_torque

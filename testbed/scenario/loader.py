@@ -1,0 +1,238 @@
+"""Reading a scenario file, part by part, so that every part's errors are found at once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from testbed.errors import UnknownNameError
+from testbed.fusion import FILTERS
+from testbed.fusion.belief import load_belief
+from testbed.models.motions import MOTIONS
+from testbed.models.turntable.turntable import TurntableParameters
+from testbed.parts import merge, preset, resolve
+from testbed.scenario.checks import cross_check
+from testbed.scenario.document import Document, unknown_key
+from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
+from testbed.sensors import SENSORS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.models.motion import Motion
+    from testbed.sensors.base import Sensor
+
+_BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read and validate a scenario.
+
+    Parameters
+    ----------
+    path : str or Path
+        A YAML 1.2 file; every dimensional value is a string with its unit.
+
+    Returns
+    -------
+    Scenario
+        Validated, in SI.
+
+    Raises
+    ------
+    ScenarioError
+        With every finding at once: file, line, key and what was expected.
+    """
+    document = Document(Path(path))
+    reader = _Reader(document, Path(path).resolve().parent)
+    scenario = reader.scenario()
+    document.refuse()
+    assert scenario is not None
+    cross_check(scenario, document)
+    document.refuse()
+    return scenario
+
+
+class _Reader:
+    """Takes a document apart, part by part, so that every part's errors are found."""
+
+    def __init__(self, document: Document, folder: Path) -> None:
+        self._doc = document
+        self._folder = folder
+        self._presets: dict[str, Any] = {"sensors": {}}
+
+    def scenario(self) -> Scenario | None:
+        data = dict(self._doc.data)
+        parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "expect")}
+        for key in [key for key in data if key not in Frame.model_fields]:
+            self._doc.find((key,), unknown_key(str(key), [*Frame.model_fields, *parts]))
+            del data[key]
+        frame = self._doc.validate(Frame, data, (), self._folder)
+        turntable = self._turntable(parts["turntable"])
+        motion = self._motion(parts["motion"])
+        sensors, types = self._sensors(parts["sensors"])
+        if frame is not None and "temperature" in frame.model_fields_set:
+            sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
+        fusion = self._fusion(parts["fusion"], types)
+        expect = self._expect(parts["expect"])
+        if frame is None or turntable is None or self._doc.problems:
+            return None
+        return Scenario(
+            frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data, self._presets
+        )
+
+    def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:
+        if data is None:
+            return {}
+        if not isinstance(data, dict):
+            self._doc.find(key, f"expected a mapping, got {data!r}")
+            return {}
+        return data
+
+    def _with_preset(
+        self, data: dict[str, Any], package: str, key: tuple[str | int, ...], default: str | None = None
+    ) -> dict[str, Any] | None:
+        """Lay `data` over the preset that it names; None if there is no such preset."""
+        name = data.get("preset", default)
+        rest = {k: v for k, v in data.items() if k != "preset"}
+        if name is None:
+            return rest
+        try:
+            return merge(preset(package, str(name)), rest)
+        except UnknownNameError as error:
+            self._doc.find((*key, "preset"), str(error))
+            return None
+
+    def _turntable(self, data: Any) -> TurntableParameters | None:
+        key = ("turntable",)
+        merged = self._with_preset(self._mapping(data, key), "testbed.models", key, "air_bearing")
+        self._presets["turntable"] = merged or {}
+        return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
+
+    def _motion(self, data: Any) -> tuple[tuple[str, Motion], ...]:
+        if not isinstance(data, list) or not data:
+            self._doc.find(
+                ("motion",),
+                "expected a list of motions, such as '- sine: {frequency: 10 Hz, rate: 1 deg/s}' or '- static: {}'",
+            )
+            return ()
+        terms = [self._term(item, ("motion", i)) for i, item in enumerate(data)]
+        return tuple(term for term in terms if term is not None)
+
+    def _term(self, item: Any, key: tuple[str | int, ...]) -> tuple[str, Motion] | None:
+        if not isinstance(item, dict) or len(item) != 1:
+            self._doc.find(key, f"expected one motion with its parameters, such as 'sine: {{...}}', got {item!r}")
+            return None
+        kind, parameters = next(iter(item.items()))
+        try:
+            model = resolve("motion", str(kind), MOTIONS)
+        except UnknownNameError as error:
+            self._doc.find((*key, kind), str(error))
+            return None
+        motion = self._doc.validate(model, self._mapping(parameters, (*key, kind)), (*key, kind), self._folder)
+        return None if motion is None else (str(kind), motion)
+
+    def _sensors(self, data: Any) -> tuple[dict[str, Sensor], dict[str, str]]:
+        sensors: dict[str, Sensor] = {}
+        types: dict[str, str] = {}
+        for name, entry in self._mapping(data, ("sensors",)).items():
+            key = ("sensors", name)
+            merged = (
+                self._with_preset(self._mapping(entry, key), "testbed.sensors", key)
+                if self._good_name(name, key)
+                else None
+            )
+            if merged is None:
+                continue
+            self._presets["sensors"][name] = merged
+            kind = str(merged.get("type", name))
+            merged = {k: v for k, v in merged.items() if k != "type"}
+            types[name] = kind
+            try:
+                model = resolve("sensor", kind, SENSORS)
+            except UnknownNameError as error:
+                self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+                continue
+            sensor = self._doc.validate(model, merged, key, self._folder)
+            if sensor is not None:
+                sensors[name] = sensor
+        return sensors, types
+
+    def _fusion(self, data: Any, types: Mapping[str, str]) -> dict[str, FilterSpec]:
+        specs = {}
+        for name, entry in self._mapping(data, ("fusion",)).items():
+            key = ("fusion", name)
+            if self._good_name(name, key):
+                spec = self._filter(name, dict(self._mapping(entry, key)), types, key)
+                if spec is not None:
+                    specs[name] = spec
+        return specs
+
+    def _filter(
+        self, name: str, entry: dict[str, Any], types: Mapping[str, str], key: tuple[str | int, ...]
+    ) -> FilterSpec | None:
+        kind = str(entry.pop("type", name))
+        believed = entry.pop("belief", "eq39")
+        try:
+            factory = resolve("filter", kind, FILTERS)
+            belief = self._belief(believed, types, key)
+        except UnknownNameError as error:
+            self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+            return None
+        model = getattr(factory, "Parameters", None)
+        parameters = entry if model is None else self._doc.validate(model, entry, key, self._folder)
+        if parameters is None or belief is None:
+            return None
+        return FilterSpec(kind, factory, parameters, belief, believed)
+
+    def _belief(
+        self, believed: Any, types: Mapping[str, str], key: tuple[str | int, ...]
+    ) -> Mapping[str, SensorBelief] | None:
+        """Return what the filter believes of each sensor: by the sensor's name, or else by its type."""
+        try:
+            known = load_belief(believed)
+        except (UnknownNameError, ValueError) as error:
+            self._doc.find((*key, "belief"), str(error))
+            return None
+        belief = {}
+        for name, kind in types.items():
+            entry = known.get(name, known.get(kind))
+            if entry is None:
+                self._doc.find(
+                    (*key, "belief"), f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
+                )
+                return None
+            belief[name] = entry
+        return belief
+
+    def _expect(self, data: Any) -> tuple[Bound, ...]:
+        bounds = []
+        for subject, metrics in self._mapping(data, ("expect",)).items():
+            for metric, text in self._mapping(metrics, ("expect", subject)).items():
+                match = _BOUND.fullmatch(text) if isinstance(text, str) else None
+                try:
+                    bounds.append(Bound(str(subject), str(metric), *_relation(match)))
+                except ValueError:
+                    self._doc.find(("expect", subject, metric), f"expected a bound such as '< 0.0143', got {text!r}")
+        return tuple(bounds)
+
+    def _good_name(self, name: Any, key: tuple[str | int, ...]) -> bool:
+        if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+            return True
+        self._doc.find(key, f"expected a name of letters, digits and underscores, got {name!r}")
+        return False
+
+
+def at_temperature(sensor: Sensor, temperature: float) -> Sensor:
+    """Return a sensor at the run's temperature [K], if it has a constant one and its entry names none."""
+    if "temperature" not in type(sensor).model_fields or "temperature" in sensor.model_fields_set:
+        return sensor
+    return sensor.model_copy(update={"temperature": temperature})
+
+
+def _relation(match: re.Match[str] | None) -> tuple[str, float]:
+    if match is None:
+        raise ValueError
+    return match[1], float(match[2])

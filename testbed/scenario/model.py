@@ -1,0 +1,209 @@
+"""A scenario: everything that one experiment needs, validated before anything runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, Field
+
+from testbed.models.motion import MotionProfile
+from testbed.models.temperature import ROOM, TemperatureProfile
+from testbed.parts import Part
+from testbed.signals import BASE_RATE_HZ, random_stream
+from testbed.units import Duration, Frequency, PositiveDuration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.models.motion import Motion
+    from testbed.models.turntable.turntable import TurntableParameters
+    from testbed.sensors.base import Sensor
+
+# Base samples of the default detail, at the least.
+_FEWEST_DETAIL = 1000
+
+
+class Frame(Part):
+    """The keys of a scenario that are no parts of their own.
+
+    Parameters
+    ----------
+    name : str
+        Names the run folder.
+    description : str, optional
+        What the experiment shows.
+    seed : int, optional
+        Seed of every random stream.
+    duration : float
+        Length of the run [s].
+    settle : float, optional
+        Metrics start here [s].
+    ramp_in : float, optional
+        Smooth ramp-in of the motion [s].
+    temperature : TemperatureProfile, optional
+        Of every instrument with temperature terms, such as ``25 degC``, or from `start` to `stop` over a time [K].
+    bandwidth : float, optional
+        Bandwidth W of the noise floor in the metrics [Hz].
+    detail : tuple of two floats, optional
+        From when to when the recording holds every sample [s]; two seconds after `settle` if not given, at least 1000
+        samples.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    duration: PositiveDuration
+    settle: Duration = 0.0
+    ramp_in: Duration = 0.5
+    temperature: TemperatureProfile = ROOM
+    bandwidth: Frequency = 1000.0
+    detail: tuple[Duration, Duration] | None = None
+
+
+METRICS = (
+    "rmse_deg_s",
+    "rmse_aligned_deg_s",
+    "peak_error_deg_s",
+    "mean_std_deg_s",
+    "inside_2_std",
+    "floor_rmse_deg_s",
+    "optimum_rmse_deg_s",
+    "missing",
+)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One expectation: `metric` of `subject` compared with `limit`."""
+
+    subject: str
+    metric: str
+    relation: str
+    limit: float
+
+    def met(self, value: float | None) -> bool:
+        """Return whether `value` is within the bound; an undefined value is not."""
+        if value is None:
+            return False
+        return {"<": value < self.limit, "<=": value <= self.limit, ">": value > self.limit, ">=": value >= self.limit}[
+            self.relation
+        ]
+
+
+@dataclass(frozen=True)
+class FilterSpec:
+    """One fusion filter of a scenario: its class, parameters, belief and the sensors that it reads."""
+
+    type: str
+    factory: Callable[..., Any]
+    parameters: Any
+    belief: Mapping[str, SensorBelief]
+    belief_name: Any
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A validated scenario in SI.
+
+    `source` is the mapping as written in the file, with the user's units, and `presets` holds the parts that presets
+    filled in; `file` is where it stands.
+    """
+
+    frame: Frame
+    turntable: TurntableParameters
+    motion: tuple[tuple[str, Motion], ...]
+    sensors: Mapping[str, Sensor]
+    sensor_types: Mapping[str, str]
+    fusion: Mapping[str, FilterSpec]
+    expect: tuple[Bound, ...]
+    file: str
+    source: Mapping[str, Any] = field(repr=False)
+    presets: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.frame.name
+
+    @property
+    def base_rate_hz(self) -> float:
+        """Rate of the base clock [Hz]: 20 kHz, or what the fastest sensor asks for where the base is held and nothing
+        else moves.
+        """
+        if self.turntable.mode != "fixed":
+            return BASE_RATE_HZ
+        return max((sensor.truth_rate for sensor in self.sensors.values()), default=BASE_RATE_HZ)
+
+    @property
+    def n_time(self) -> int:
+        """Number of samples of the base clock."""
+        return round(self.frame.duration * self.base_rate_hz)
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        """Commanded line frequencies [Hz], ascending."""
+        return tuple(sorted({line for _, motion in self.motion for line in motion.lines()}))
+
+    @property
+    def detail(self) -> tuple[float, float]:
+        """From when to when the recording holds every sample [s]."""
+        length = max(2.0, _FEWEST_DETAIL / self.base_rate_hz)
+        start, stop = self.frame.detail or (self.frame.settle, self.frame.settle + length)
+        return start, min(stop, self.frame.duration)
+
+    def profile(self, ramp_in: float | None = None) -> MotionProfile:
+        """Return the commanded motion from its start; ScenarioError if a recorded one cannot be read.
+
+        Parameters
+        ----------
+        ramp_in : float, optional
+            Length of the ramp-in instead of the scenario's [s].
+        """
+        seed, duration = self.frame.seed, self.frame.duration
+        terms = [
+            motion.start(duration, random_stream(seed, "motion", str(i), kind))
+            for i, (kind, motion) in enumerate(self.motion)
+        ]
+        return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
+
+    def with_seed(self, seed: int) -> Scenario:
+        """Return the same scenario under another seed."""
+        return replace(self, frame=self.frame.model_copy(update={"seed": seed}))
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the whole scenario as a mapping with SI units, which loads to the same scenario again."""
+        return {
+            **dump(self.frame),
+            "turntable": dump(self.turntable),
+            "motion": [{kind: dump(motion)} for kind, motion in self.motion],
+            "sensors": {
+                name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
+            },
+            "fusion": {
+                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                for name, spec in self.fusion.items()
+            },
+            "expect": _expectations(self.expect),
+        }
+
+
+def dump(part: BaseModel) -> dict[str, Any]:
+    """Return a part as a mapping with SI units that validates to the same part; what is unset by default and unset here
+    is left out.
+    """
+    written = part.model_dump(mode="json", context={"border": True})
+    fields = type(part).model_fields
+    return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def _parameters(spec: FilterSpec) -> dict[str, Any]:
+    return dump(spec.parameters) if isinstance(spec.parameters, BaseModel) else dict(spec.parameters)
+
+
+def _expectations(bounds: tuple[Bound, ...]) -> dict[str, dict[str, str]]:
+    table: dict[str, dict[str, str]] = {}
+    for bound in bounds:
+        table.setdefault(bound.subject, {})[bound.metric] = f"{bound.relation} {bound.limit!r}"
+    return table

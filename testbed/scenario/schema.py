@@ -1,0 +1,84 @@
+"""The JSON schema of a scenario file, for editors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from testbed.fusion import FILTERS
+from testbed.models.motions import MOTIONS
+from testbed.models.turntable import TurntableParameters
+from testbed.parts import preset_names, resolve
+from testbed.scenario.model import Frame
+from testbed.sensors import SENSORS
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema (draft 2020-12) of a scenario file, for editors."""
+    definitions: dict[str, Any] = {}
+
+    def part(model: type[Any]) -> dict[str, Any]:
+        raw: dict[str, Any] = model.model_json_schema(ref_template="#/$defs/{model}")
+        # A preset may supply the keys of nested parts too, such as the channel of an MHD ARS.
+        definitions.update({name: _optional(nested) for name, nested in raw.pop("$defs", {}).items()})
+        return raw
+
+    frame = part(Frame)
+    turntable = part(TurntableParameters)
+    turntable["properties"]["preset"] = {"enum": preset_names("testbed.models")}
+    properties = {
+        **frame["properties"],
+        "turntable": _optional(turntable),
+        "motion": {
+            "type": "array",
+            "minItems": 1,
+            "items": {"oneOf": [_one_key(name, part(resolve("motion", name, MOTIONS))) for name in MOTIONS]},
+        },
+        "sensors": {
+            "type": "object",
+            "additionalProperties": {
+                "anyOf": [_sensor(name, part(resolve("sensor", name, SENSORS))) for name in SENSORS]
+            },
+        },
+        "fusion": {
+            "type": "object",
+            "additionalProperties": {"type": "object"},
+            "properties": {name: _filter(name, part) for name in FILTERS},
+        },
+        "expect": {
+            "type": "object",
+            "additionalProperties": {
+                "type": "object",
+                "additionalProperties": {"type": "string", "pattern": r"^\s*(<=|>=|<|>)\s*[-+0-9.eE]+\s*$"},
+            },
+        },
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Scenario of the testbed",
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["name", "duration", "motion"],
+        "properties": properties,
+        "$defs": definitions,
+    }
+
+
+def _optional(model: dict[str, Any]) -> dict[str, Any]:
+    """Presets may supply every key, so none is required in the file."""
+    return {key: value for key, value in model.items() if key != "required"}
+
+
+def _one_key(name: str, model: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "required": [name], "additionalProperties": False, "properties": {name: model}}
+
+
+def _sensor(name: str, model: dict[str, Any]) -> dict[str, Any]:
+    optional = _optional(model)
+    presets = {"preset": {"enum": preset_names("testbed.sensors")}, "type": {"const": name}}
+    return {**optional, "properties": {**optional["properties"], **presets}}
+
+
+def _filter(name: str, part: Any) -> dict[str, Any]:
+    model = _optional(part(resolve("filter", name, FILTERS).Parameters))
+    extra = {"type": {"type": "string"}, "belief": {"type": ["string", "object"]}}
+    return {**model, "properties": {**model["properties"], **extra}}

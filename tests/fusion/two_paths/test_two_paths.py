@@ -1,0 +1,320 @@
+"""Complementary and blending filter against closed forms, a plain twin of the kernel and Monte Carlo."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from testbed.fusion.analysis.optimum import optimum
+from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.fusion.filters.blending import Blending
+from testbed.fusion.filters.complementary import Complementary
+from testbed.fusion.model import build_model
+from testbed.fusion.two_paths.base import TwoPathParameters
+from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass
+from testbed.fusion.two_paths.noise import noise_variance
+
+DEG = np.pi / 180.0
+RATES = {"mems_gyro": 2000.0, "mhd_ars": 20000.0}
+FILTERS = [Complementary, Blending]
+N, SMALL, CORNER = 4e-5, 1e-7, 15.0
+# A white gyro and a white high-pass: the textbook pair.
+PLAIN = {
+    "mems_gyro": SensorBelief(numerator=(300.0,), denominator=(1.0, 300.0), input_noise=N, output_noise=1e-3 * SMALL),
+    "mhd_ars": SensorBelief(
+        numerator=(9000.0, 0.0), denominator=(1.0, 9000.0 + CORNER, 9000.0 * CORNER), output_noise=SMALL
+    ),
+}
+# The gyro takes over at 75 rad/s and not at 0.04, so that everything settles in a second.
+QUICK = {
+    "mhd_ars": load_belief("identified")["mhd_ars"],
+    "mems_gyro": SensorBelief(numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8),
+}
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("order", "divisor"), [(1, 1.0), (2, np.sqrt(3.0))])
+def test_crossover_is_the_closed_form(order: int, divisor: float) -> None:
+    """N against n w_c / w: sigma^2 = N^2 w / 2 + n^2 w_c^2 / (2 w) for order 1; for order 2 the integrals of a
+    Butterworth pair.
+    """
+    found = best_crossover(PLAIN["mems_gyro"], PLAIN["mhd_ars"], order)
+    # What is neglected: the white part of the MHD sensor, (n / N)^2, and the grid from 1e-5 Hz: 1 % of the crossover.
+    assert found == pytest.approx(CORNER * SMALL / N / divisor, rel=0.02, abs=0.0)
+
+
+@pytest.mark.parametrize(("cls", "crossover"), [(Complementary, 5.60e-3), (Blending, 3.24e-3)])
+def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) -> None:
+    found = cls(load_belief("identified"), RATES, TwoPathParameters())
+    assert found.crossover_hz == pytest.approx(crossover, rel=2e-3, abs=0.0)
+    # The search ends within 1 %.
+    assert found.bandwidth_hz == pytest.approx(169.0, rel=0.02)
+
+
+@pytest.mark.oracle
+def test_no_first_order_crossover_beats_the_derived_one_and_the_optimum_is_not_beaten() -> None:
+    belief = load_belief("identified")
+    best = Complementary(belief, RATES, TwoPathParameters())
+
+    def claimed(**own: float) -> float:
+        zeros = {"mems_gyro": np.zeros(1), "mhd_ars": np.zeros(1)}
+        return float(Complementary(belief, RATES, TwoPathParameters(**own)).process(zeros).std[0])
+
+    least = claimed()
+    for factor in (0.8, 1.25):
+        assert claimed(crossover=factor * best.crossover_hz) > least
+        assert claimed(bandwidth=factor * best.bandwidth_hz) > least
+    # Optimum of any order and q on a decade grid: for this noise the filter is of the same form, and may gain from the
+    # finer grid.
+    assert least == pytest.approx(optimum(belief, RATES, [(10.0, DEG)]).rmse, rel=0.05, abs=0.0)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("extra", [0, 1])
+def test_low_pass_lags_in_its_last_derivative_only(order: int, extra: int) -> None:
+    b, a = low_pass(order, 50.0, order + extra)
+    s = 1j * np.array([0.05, 0.5])
+    error = np.abs(1.0 - np.polyval(b, s) / np.polyval(a, s))
+    # Ten times the frequency, 10^order times the error; 1 % from the next term at w / 100, and rounding near 1e-9.
+    assert np.log10(error[1] / error[0]) == pytest.approx(order, abs=0.03)
+    assert a.size - b.size == 1 + extra
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("cls", FILTERS)
+@pytest.mark.parametrize("freq", [2.0, 40.0])
+def test_exact_readings_of_a_sine_give_the_band_end(cls: Any, freq: float) -> None:
+    """Paths add up to B: the error of a settled sine is |1 - B| A, whatever the share of the sensors (crossover inside
+    the test).
+    """
+    p = TwoPathParameters(crossover=2.0, bandwidth=300.0)
+    found = cls(QUICK, RATES, p)
+    t = np.arange(40_000) / 20_000.0
+    phase = 2j * np.pi * freq * t
+    z = {
+        name: (DEG * QUICK[name].realisation().response(np.array([freq]))[0] * np.exp(phase)).imag[
+            :: 20_000 // int(rate)
+        ]
+        for name, rate in RATES.items()
+    }
+    rate = found.process(z).rate
+    basis = np.stack([np.cos(phase.imag), np.sin(phase.imag)])[:, 30_000:]
+    c = np.linalg.lstsq(basis.T, rate[30_000:], rcond=None)[0]
+    b, a = band_end(QUICK["mems_gyro"], QUICK["mhd_ars"], 2.0 * np.pi * 300.0)
+    s = 2j * np.pi * freq
+    wanted = np.polyval(b, s) / np.polyval(a, s)
+    if cls is Blending:
+        # The loop sees what the band end leaves out, and closes on it: (B + P G) / (1 + P G) with P of corner 2 Hz.
+        w = 2.0 * np.pi * 2.0
+        loop = (np.sqrt(2.0) * w * s + w**2) / s**2 * QUICK["mems_gyro"].realisation().response(np.array([freq]))[0]
+        wanted = (wanted + loop) / (1.0 + loop)
+    # Held readings of the slow path of `complementary` are half a gyro period late: w T / 2 of the share of the slow
+    # path.
+    late = np.pi * freq / 2000.0 * min(1.0, 2.0 / freq) if cls is Complementary else 0.0
+    # Hold between samples, straight against a sine: (w T)^2 / 12, and what is left of the start, e^-15 at least.
+    tolerance = late + (2.0 * np.pi * freq / 20_000.0) ** 2 / 12.0 + 1e-5
+    assert abs(complex(c[1], c[0]) / DEG - wanted) < tolerance
+
+
+def plain_twin(found: Any, fast: np.ndarray, slow: np.ndarray) -> np.ndarray:
+    """Run the recursion with matrices, fast readings complete."""
+    Phi, Gamma, ramp, E, C, D, H, J, _ = found._matrices
+    innovate = found._setting[0]
+    x, held, rates = np.zeros(len(Phi)), 0.0, []
+    for k, z in enumerate(fast):
+        if k:
+            x = Phi @ x + Gamma * fast[k - 1] + ramp * (z - fast[k - 1]) + E * held
+        if not np.isnan(slow[k]):
+            predicted = H @ x + J * z
+            held = (slow[k] if np.isfinite(slow[k]) else predicted) - innovate * predicted
+        rates.append(C @ x + D * z)
+    return np.array(rates)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_kernel_is_its_plain_twin(cls: Any) -> None:
+    rng = np.random.default_rng(5)
+    # Within the gate against spikes, of which the plain recursion knows nothing.
+    z = {"mems_gyro": 0.1 * DEG * rng.standard_normal(200), "mhd_ars": 0.1 * DEG * rng.standard_normal(2000)}
+    z["mems_gyro"][50:70] = np.nan
+    found = cls(QUICK, RATES, TwoPathParameters())
+    slow = np.full(2000, np.nan)
+    slow[::10] = np.where(np.isfinite(z["mems_gyro"]), z["mems_gyro"], np.inf)
+    wanted = plain_twin(found, z["mhd_ars"], slow)
+    # Sums in another order, over 2000 steps.
+    np.testing.assert_allclose(found.process(z).rate, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_lasting_change_passes_the_gate_after_ten_readings(cls: Any) -> None:
+    """A rate that jumps to 200 deg/s is outside the gate, but what lasts is the signal: the eleventh reading counts."""
+    fast = np.concatenate([np.zeros(2000), np.full(2000, 200.0 * DEG)])
+    found = cls(QUICK, RATES, TwoPathParameters()).process({"mhd_ars": fast, "mems_gyro": fast[::10]})
+    assert np.abs(found.rate[:2010]).max() < 1e-6
+    assert found.rate[-1] > 100.0 * DEG
+
+
+@pytest.fixture(scope="module")
+def noise_of_many() -> np.ndarray:
+    """Return the readings of 60 runs of 1 s from the noise model of `QUICK` at standstill, shape (n_time, n_sensor,
+    n_run).
+    """
+    rng = np.random.default_rng(8)
+    model = build_model(QUICK, RATES, order=1, q=0.0)
+    root = np.linalg.cholesky(model.Q[1:, 1:] + 1e-40 * np.eye(len(model.F) - 1))
+    state, Z = np.zeros((len(model.F), 60)), np.empty((20_000, 2, 60))
+    for z in Z:
+        state = model.F @ state
+        state[1:] += root @ rng.standard_normal((len(root), 60))
+        z[:] = model.H @ state
+    return Z + np.sqrt(model.R)[:, None] * rng.standard_normal(Z.shape)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("cls", FILTERS)
+def test_claimed_noise_is_the_scatter_of_many_runs(cls: Any, noise_of_many: np.ndarray) -> None:
+    power, claimed = [], 0.0
+    for run in range(60):
+        found = cls(QUICK, RATES, TwoPathParameters(amplitude=1e-12, bandwidth=300.0))
+        block = found.process({"mems_gyro": noise_of_many[::10, 0, run], "mhd_ars": noise_of_many[:, 1, run]})
+        power.append(np.mean(block.rate[12_000:] ** 2))
+        claimed = float(np.sqrt(np.mean(block.std[-10:] ** 2)))
+    # 60 runs, each of some ten independent stretches of the slow part: 5 sqrt(2 / 600) in variance, half of it in
+    # deviation.
+    assert np.sqrt(np.mean(power)) == pytest.approx(claimed, rel=0.15, abs=0.0)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("where", ["input_noise", "output_noise"])
+@pytest.mark.parametrize(("cls", "factor"), [(Complementary, 1.0), (Blending, np.sqrt(1.5))])
+def test_noise_variance_of_the_plain_pair_is_the_closed_form(cls: Any, factor: float, where: str) -> None:
+    """N^2 w / 2 + n^2 w_c^2 / (2 w) = N n w_c at w = w_c n / N, sqrt(3/2) of it for the loop; n^2 integral of |B|^2,
+    5/3 of B's corner.
+    """
+    noise = {"input_noise": 1e-9, "output_noise": 1e-9, where: N}
+    slow = PLAIN["mems_gyro"].model_copy(update=noise)
+    fast = PLAIN["mhd_ars"]
+    found = cls({"mems_gyro": slow, "mhd_ars": fast}, RATES, TwoPathParameters(bandwidth=20.0))
+    band = band_end(slow, fast, 2.0 * np.pi * 20.0)
+    paths = found.paths(slow, fast, 2.0 * np.pi * found.crossover_hz, band)
+    wanted = factor * N * SMALL * CORNER + 5.0 / 3.0 * 2.0 * np.pi * 20.0 * SMALL**2
+    # The crossover is within 2 % of its flat minimum; sampling folds (a T)^2 / 12 = 0.2 % of the gyro's noise back.
+    assert noise_variance(paths, found.model, 0, 1).mean() == pytest.approx(wanted, rel=0.006, abs=0.0)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("cls", FILTERS)
+def test_share_of_each_path_in_continuous_time(cls: Any) -> None:
+    """B L and B (1 - L) side by side; P G / (1 + P G) and B / (1 + P G) for the loop, P = (k_p s + k_i) / s^2."""
+    slow, fast = (load_belief("identified")[name] for name in ("mems_gyro", "mhd_ars"))
+    w = 2.0 * np.pi * 0.05
+    band = band_end(slow, fast, 2.0 * np.pi * 200.0)
+    paths = cls(load_belief("identified"), RATES, TwoPathParameters()).paths(slow, fast, w, band)
+    freq = np.array([0.003, 0.05, 0.3, 8.0, 150.0, 900.0])
+    s = 2j * np.pi * freq
+    end = np.polyval(band[0], s) / np.polyval(band[1], s)
+    of_slow, of_fast = (one.realisation().response(freq) for one in (slow, fast))
+    if paths.innovate:
+        loop = (np.sqrt(2.0) * w * s + w**2) / s**2 * of_slow
+        shares = loop / (1.0 + loop), end / (1.0 + loop)
+    else:
+        shares = end * w / (s + w), end * s / (s + w)
+    for wanted, slow_part, fast_part in zip(shares, (of_slow, 0.0 * of_slow), (0.0 * of_fast, of_fast), strict=True):
+        for k, at in enumerate(s):
+            A = paths.A - paths.innovate * np.outer(paths.E, paths.H)
+            held = slow_part[k] - paths.innovate * paths.J * fast_part[k]
+            x = np.linalg.solve(at * np.eye(len(A)) - A, paths.B * fast_part[k] + paths.E * held)
+            # Polynomials of degree ten over seven decades keep nine digits.
+            assert abs(paths.C @ x + paths.D * fast_part[k] - wanted[k]) < 1e-8
+            # And the slow reading is foreseen as the slow sensor reads the estimate.
+            assert abs(paths.H @ x + paths.J * fast_part[k] - of_slow[k] * wanted[k]) < 1e-8
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
+    """Without the gyro the variance grows by w_c^2 n^2 per second, and a sine is still followed."""
+    t = np.arange(40_000) / 20_000.0
+    belief = load_belief("identified")
+    response = belief["mhd_ars"].realisation().response(np.array([10.0]))[0]
+    z = {"mhd_ars": (DEG * response * np.exp(20j * np.pi * t)).imag, "mems_gyro": np.full(4000, np.nan)}
+    block = cls(belief, RATES, TwoPathParameters()).process(z)
+    # 1 % of the amplitude: the start-up of a sine that was there before.
+    assert np.std((block.rate - DEG * np.sin(20.0 * np.pi * t))[20_000:]) < 0.01 * DEG
+    low = 2.0 * np.pi * 1e-4
+    drift = (
+        low * belief["mhd_ars"].output_noise / abs(belief["mhd_ars"].realisation().response(np.array([1e-4]))[0])
+    ) ** 2
+    growth = (block.std[-1] ** 2 - block.std[20_000] ** 2) / (t[-1] - t[20_000])
+    assert growth == pytest.approx(drift, rel=1e-3, abs=0.0)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_drift_is_forgotten_once_the_slow_sensor_is_back(cls: Any) -> None:
+    """Its variance falls by exp(-2 w t), w the slowest pole of the crossover: w_c of the first order, w_c / sqrt(2) of
+    the loop.
+    """
+    z = {"mems_gyro": np.zeros(4000), "mhd_ars": np.zeros(40_000)}
+    whole = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std
+    z["mems_gyro"][500:2000] = np.nan
+    extra = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std ** 2 - whole**2
+    assert extra[19_999] > 0.0
+    w = np.pi * {Complementary: 1.0, Blending: np.sqrt(0.5)}[cls]
+    # 0.6 s after; the difference of two variances keeps some digits less.
+    assert extra[32_000] / extra[20_000] == pytest.approx(np.exp(-2.0 * w * 0.6), rel=1e-3)
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_lost_fast_sensor_holds_the_rate(cls: Any) -> None:
+    rng = np.random.default_rng(1)
+    z = {"mhd_ars": 1e-3 * rng.standard_normal(30_000), "mems_gyro": 1e-3 * rng.standard_normal(3000)}
+    z["mhd_ars"][10_000:20_000] = np.nan
+    block = cls(QUICK, RATES, TwoPathParameters()).process(z)
+    assert np.all(block.rate[10_000:20_000] == block.rate[9_999])
+    # A sine of unknown phase departs by its own power twice, no more.
+    assert block.std[19_999] == pytest.approx(DEG, rel=1e-3, abs=0.0)
+    assert np.abs(block.rate[20_000:]).max() < 0.1
+
+
+def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> None:
+    """A constant in the MHD reading drifts through the inverse; order 1 leaves w_c / w of it, the integral part
+    nothing.
+    """
+    left = {}
+    for cls in FILTERS:
+        found = cls(QUICK, RATES, TwoPathParameters(crossover=1.0, bandwidth=300.0))
+        z = {"mems_gyro": np.zeros(8000), "mhd_ars": np.full(80_000, 1e-4)}
+        left[cls] = abs(found.process(z).rate[-1]) / 1e-4
+    low = 1e-3
+    w_c = 2.0 * np.pi * low / abs(QUICK["mhd_ars"].realisation().response(np.array([low]))[0])
+    assert left[Complementary] == pytest.approx(w_c / (2.0 * np.pi), rel=1e-3)
+    assert left[Blending] < 1e-3
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_sensors_that_cannot_be_joined_are_refused(cls: Any) -> None:
+    good = dict(load_belief("eq39"))
+    with pytest.raises(ValueError, match="belief: expected two sensors"):
+        cls(good, {"mhd_ars": 20_000.0}, TwoPathParameters())
+    with pytest.raises(ValueError, match="highest sample rate"):
+        cls(good, {"mhd_ars": 2000.0, "mems_gyro": 20_000.0}, TwoPathParameters())
+    right = SensorBelief(numerator=(-2000.0, 9e5, 0.0), denominator=(0.255, 2178.0, 33900.0), output_noise=1e-7)
+    with pytest.raises(ValueError, match="inverse is stable"):
+        cls(good | {"mhd_ars": right}, RATES, TwoPathParameters())
+
+
+def test_a_loop_wider_than_its_sensor_is_refused() -> None:
+    with pytest.raises(ValueError, match="crossover: expected one well inside"):
+        Blending(load_belief("eq39"), RATES, TwoPathParameters(crossover=800.0))
+
+
+def test_two_zeros_at_dc_raise_the_order_of_one_and_are_refused_by_the_other() -> None:
+    twice = SensorBelief(
+        numerator=(9000.0, 0.0, 0.0), denominator=tuple(np.poly([-9000.0, -15.0, -0.3])), output_noise=1e-7
+    )
+    belief = {**PLAIN, "mhd_ars": twice}
+    assert np.isfinite(Complementary(belief, RATES, TwoPathParameters()).crossover_hz)
+    with pytest.raises(ValueError, match="at most one zero"):
+        Blending(belief, RATES, TwoPathParameters())
