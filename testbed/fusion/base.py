@@ -207,7 +207,10 @@ class BlockFilter:
         R = np.array([chosen.get(name, self.model.R[i]) for i, name in enumerate(self.model.sensors)])
         for name, value in zip(self.model.sensors, R, strict=True):
             if not value > 0.0:
-                msg = f"{key}: expected more than 0 for {name!r}, got {value}; give it here or give the belief an output_noise"
+                msg = (
+                    f"{key}: expected more than 0 for {name!r}, got {value}; "
+                    "give it here or give the belief an output_noise"
+                )
                 raise ValueError(msg)
         return R
 
@@ -247,8 +250,8 @@ class BlockFilter:
             due = row[-self._sample % stride :: stride]
             if values.shape != due.shape:
                 msg = (
-                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples from {self._sample} on), "
-                    f"got shape {values.shape}"
+                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples "
+                    f"from {self._sample} on), got shape {values.shape}"
                 )
                 raise ValueError(msg)
             due[:] = np.where(np.abs(values) <= LARGEST_RATE, values, np.inf)
