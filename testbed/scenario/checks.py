@@ -13,7 +13,7 @@ from testbed.scenario.model import METRICS
 from testbed.scenario.step_choice import given_step
 
 if TYPE_CHECKING:
-    from testbed.scenario.document import Document
+    from testbed.document import Document
     from testbed.scenario.model import Scenario
 
 _BLOCK = 20_000
