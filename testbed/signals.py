@@ -59,7 +59,7 @@ class LinearFilter:
     .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
 
     State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0
-    before the first sample; a first sample other than zero is a step).
+    before the first sample; a first sample other than zero is a step), unless it is told to `settle`.
 
     Parameters
     ----------
@@ -87,6 +87,35 @@ class LinearFilter:
         self._Phi, self._Gamma, self._step = power[:n, :n].copy(), power[:n, n].copy(), power[:n, n + 1].copy()
         self._C, self._D = C, D
         self._x, self._previous, self._started = np.zeros(n), 0.0, False
+        self._level: float | None = None
+
+    def settle(self, level: float, noise_std: float, stream: np.random.Generator) -> None:
+        r"""Start as if the input had been constant beside white noise for ever.
+
+        .. math:: x_0 = \bar x + \xi + s (u_0 - \bar u), \quad \mathrm{cov}\, \xi = \Phi\, \mathrm{cov}\, \xi\, \Phi'
+            + \sigma^2 b b', \quad b = \Phi s + \Gamma - s
+
+        with :math:`\bar x` the equilibrium at `level`, s what the last sample's ramp adds; before the first sample only.
+
+        Parameters
+        ----------
+        level : float
+            The constant, any unit.
+        noise_std : float
+            Standard deviation of the white samples [unit of `level`].
+        stream : numpy.random.Generator
+            Source of the state that the noise has left.
+        """
+        from scipy.linalg import solve_discrete_lyapunov
+
+        self._level = level
+        if self._x.size:
+            self._x += np.linalg.solve(np.eye(self._x.size) - self._Phi, self._Gamma) * level
+        if self._x.size and noise_std > 0.0:
+            b = noise_std * (self._Phi @ self._step + self._Gamma - self._step)
+            P = solve_discrete_lyapunov(self._Phi, np.outer(b, b), method="direct")
+            value, vector = np.linalg.eigh(0.5 * (P + P.T))
+            self._x += vector @ (np.sqrt(np.maximum(value, 0.0)) * stream.standard_normal(value.size))
 
     def process(self, u: FloatArray) -> FloatArray:
         """Filter the next samples.
@@ -103,9 +132,11 @@ class LinearFilter:
         """
         y = np.empty(u.size)
         if u.size and not self._started:
-            # A jump at t = 0 leaves the state at rest: only the feed-through passes it at once.
+            # From rest a jump at t = 0 leaves the state as it is: only the feed-through passes it at once.
             self._previous, self._started = float(u[0]), True
-            y[0] = self._D * u[0]
+            if self._level is not None:
+                self._x += self._step * (float(u[0]) - self._level)
+            y[0] = self._C @ self._x + self._D * u[0]
             self._previous = _advance(
                 self._x, self._Phi, self._Gamma, self._step, self._C, self._D, self._previous, u[1:], y[1:]
             )

@@ -145,7 +145,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         ]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MemsGyroStage:
-        """Return the gyro at rest; see `Sensor.start`."""
+        """Return the gyro in equilibrium with its first sample, its noise stationary; see `Sensor.start`."""
         return MemsGyroStage(self, input_rate_hz, seed, name)
 
 
@@ -174,6 +174,8 @@ class MemsGyroStage:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
         self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.range, rounding=gyro.noise)
         self._losses = stream("dropped")
+        self._white = gyro.angle_random_walk * input_rate_hz**0.5 if gyro.noise else 0.0
+        self._before: np.random.Generator | None = stream("before")
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s], level, still and at T_0."""
@@ -182,6 +184,10 @@ class MemsGyroStage:
     def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]; NaN where one is lost."""
         sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
+        if sensed.size and self._before is not None:
+            # As it was before the record: in equilibrium with the rate that is on, its noise stationary.
+            self._low_pass.settle(float(sensed[0]) + self._noise.level, self._white, self._before)
+            self._before = None
         filtered = self._low_pass.process(sensed + self._noise.process(true_rate.size))
         taken = self._decimator.process(self._fir.process(filtered))
         readings = self._converter.process(np.where(np.abs(taken) < self._gyro.dead_band, 0.0, taken))

@@ -154,7 +154,7 @@ class MhdArs(Sensor, ElectronicTerms):
         return [block for block in (self.anti_alias, delay) if block is not None]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MhdArsStage:
-        """Return the sensor at rest; see `Sensor.start`."""
+        """Return the sensor in equilibrium with its first sample; see `Sensor.start`."""
         return MhdArsStage(self, input_rate_hz, seed, name)
 
 
@@ -166,7 +166,7 @@ class MhdArsStage:
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
         self._johnson = NoiseStage(_johnson_terms(sensor, input_rate_hz, seed, name))
-        self._gain = sensor.channel_gain
+        self._gain, self._first = sensor.channel_gain, np.nan
         self._analogue = _analogue_chain(sensor, input_rate_hz)
         self._noise = NoiseStage(sensor.noise_terms(sensor.sample_rate, seed, name) if sensor.noise else {})
         self._converter = Converter(
@@ -175,7 +175,10 @@ class MhdArsStage:
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        slip = self._channel.process(true_rate)
+        if true_rate.size and np.isnan(self._first):
+            self._first = float(true_rate[0])
+        # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
+        slip = self._channel.process(true_rate - self._first)
         signal = self._gain * (slip + self._johnson.process(slip.size))
         for stage in self._analogue:
             signal = stage.process(signal)

@@ -102,6 +102,11 @@ class FirstOrderBank:
         self._p, self._gain, self._stream = 1.0 - decay, gain, stream
         self._state = _stationary_root(decay, gain) @ stream.standard_normal(decay.size)
 
+    @property
+    def level(self) -> float:
+        """Where the noise stands before its next sample, unit of the gain."""
+        return float(self._state.sum())
+
     def process(self, n_time: int) -> FloatArray:
         """Return the next `n_time` samples, unit of the gain."""
         y = self._stream.standard_normal(n_time)
@@ -255,6 +260,11 @@ class NoiseStage:
 
     def __init__(self, terms: dict[str, NoiseTerm]) -> None:
         self.terms = terms
+
+    @property
+    def level(self) -> float:
+        """Where the slow terms stand before the next sample, unit of the terms."""
+        return sum(term.level for term in self.terms.values() if isinstance(term, FirstOrderBank))
 
     def process(self, n_time: int) -> FloatArray:
         """Return the next `n_time` samples of the sum, shape (n_time,), unit of the terms."""
