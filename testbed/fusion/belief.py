@@ -1,4 +1,4 @@
-"""What a filter believes about its sensors: a transfer function and white noise, kept apart from what the sensors are."""
+"""What a filter believes about its sensors: a transfer function and white noise, apart from what the sensors are."""
 
 from __future__ import annotations
 
@@ -130,8 +130,8 @@ def _check_poles(poles: ComplexArray) -> None:
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
     if np.any(distance < _CLOSEST_POLES * np.abs(poles)):
         msg = (
-            f"denominator: expected distinct poles, got {np.round(poles, 6).tolist()} rad/s; the modal form needs them apart: "
-            "move one of the coinciding poles by 1 %"
+            f"denominator: expected distinct poles, got {np.round(poles, 6).tolist()} rad/s; the modal form needs them "
+            "apart: move one of the coinciding poles by 1 %"
         )
         raise ValueError(msg)
 

@@ -172,7 +172,10 @@ class ModelFilter(BlockFilter):
         R = np.array([chosen.get(name, self.model.R[i]) for i, name in enumerate(self.model.sensors)])
         for name, value in zip(self.model.sensors, R, strict=True):
             if not value > 0.0:
-                msg = f"{key}: expected more than 0 for {name!r}, got {value}; give it here or give the belief an output_noise"
+                msg = (
+                    f"{key}: expected more than 0 for {name!r}, got {value}; "
+                    "give it here or give the belief an output_noise"
+                )
                 raise ValueError(msg)
         return R
 

@@ -81,7 +81,8 @@ class ArwShakfLiteralParameters(ArwShakfParameters):
 class ArwShakf(SageHusa):
     r"""Sage-Husa filter whose R is set by bands of the online angle random walk N_k and inflated by S_k.
 
-    .. math:: N_k/dT = (1 - g_k) N_{k-1}/dT + g_k (z_k - z_{k-1})^2 / 2, \quad \tilde R = S R,\; S = \max(1, \alpha \hat C / (H P^- H' + R))
+    .. math:: N_k/dT = (1 - g_k) N_{k-1}/dT + g_k (z_k - z_{k-1})^2 / 2, \quad \tilde R = S R,\;
+        S = \max(1, \alpha \hat C / (H P^- H' + R))
 
     On entering a band R takes the band's value; within it R follows (17). For a sine N_k sees amplitude times
     frequency, so the bands hold for the amplitude that they were calibrated at

@@ -36,7 +36,8 @@ class KalmanParameters(CovarianceParameters):
 class Kalman(ModelFilter):
     r"""Kalman filter of the augmented model with fixed Q and R, in Joseph form.
 
-    .. math:: x^- = F x,\; P^- = F P F' + Q,\; K = P^- H' (H P^- H' + R)^{-1},\; x = x^- + K e,\; P = (I - K H) P^- (I - K H)' + K R K'
+    .. math:: x^- = F x,\; P^- = F P F' + Q,\; K = P^- H' (H P^- H' + R)^{-1},\; x = x^- + K e,\;
+        P = (I - K H) P^- (I - K H)' + K R K'
 
     The readings of one instant are used one after the other, which for independent noise is the joint update. The state
     starts at zero; nothing is predicted before the first reading.

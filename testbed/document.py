@@ -30,6 +30,8 @@ class Document:
     ----------
     path : Path
         The file.
+    what : str
+        What it should hold, with its first keys, for the message about an empty or wrong one.
 
     Raises
     ------
@@ -37,8 +39,8 @@ class Document:
         If it cannot be read, is empty, binary, no mapping, or breaks YAML 1.2 (a repeated key does).
     """
 
-    def __init__(self, path: Path) -> None:
-        self.file = str(path)
+    def __init__(self, path: Path, what: str = "scenario (name, duration, motion, sensors, ...)") -> None:
+        self.file, self._what = str(path), what
         self.problems: list[Problem] = []
         self.data = self._mapping(self._parse(self._text(path)))
 
@@ -71,7 +73,7 @@ class Document:
     def _text(self, path: Path) -> str:
         try:
             if path.stat().st_size > _LARGEST:
-                self._fatal(f"expected a scenario of at most {_LARGEST} bytes")
+                self._fatal(f"expected a {self._what.split()[0]} of at most {_LARGEST} bytes")
             text = path.read_text(encoding="utf-8-sig")
         except UnicodeDecodeError:
             self._fatal("expected a YAML text in UTF-8, got a binary file")
@@ -92,9 +94,9 @@ class Document:
 
     def _mapping(self, data: Any) -> Any:
         if data is None:
-            self._fatal("is empty; expected a scenario (name, duration, motion, sensors, ...)")
+            self._fatal(f"is empty; expected a {self._what}")
         if not isinstance(data, dict):
-            self._fatal("expected a mapping (name: ..., duration: ..., motion: ...)", line=1)
+            self._fatal(f"expected a mapping, the keys of a {self._what}", line=1)
         return data
 
     def _fatal(self, message: str, error: MarkedYAMLError | None = None, *, line: int | None = None) -> NoReturn:
