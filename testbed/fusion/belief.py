@@ -15,7 +15,7 @@ from testbed.parts import Part
 from testbed.units import Frequency, Range, RateDensity, RateRandomWalk, RateStd
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import control
 
@@ -98,6 +98,11 @@ class SensorBelief(Part):
     def _check(self) -> SensorBelief:
         self.realisation()
         return self
+
+    @property
+    def n_pole(self) -> int:
+        """Number of poles, and of states of the realisation."""
+        return np.trim_zeros(np.asarray(self.denominator), "f").size - 1
 
     @property
     def sees_constant(self) -> bool:
@@ -212,6 +217,14 @@ def _shipped(name: str) -> dict[str, SensorBelief]:
         raise UnknownNameError(kind, name, names)
     content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
     return {key: SensorBelief.model_validate(value, context={"border": True}) for key, value in content.items()}
+
+
+def check_belief(belief: Mapping[str, SensorBelief], sensors: Iterable[str]) -> None:
+    """Raise ValueError if there is no sensor, or one of which nothing is believed."""
+    names = list(sensors)
+    if not names or any(name not in belief for name in names):
+        msg = f"belief: expected one for each of {names}, got {list(belief)}"
+        raise ValueError(msg)
 
 
 def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
