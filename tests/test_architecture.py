@@ -16,7 +16,7 @@ import testbed
 from testbed.parts import Part
 
 ROOT = Path(testbed.__file__).parent
-FOUNDATION = {"errors", "parts", "units", "signals", "_version"}
+FOUNDATION = {"errors", "inputs", "parts", "units", "signals", "_version"}
 # Each room and what it may import of the house, besides the foundation and itself: the data flow, from the ground floor
 # up.
 ROOMS = {
