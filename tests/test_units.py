@@ -43,6 +43,19 @@ DEG = math.pi / 180
         ("0.02 %/K", "K^-1", 2e-4),
         ("0.005 deg/s/K", "rad/s/K", 0.005 * DEG),
         ("0.01 deg/s/g0", "rad*s/m", 0.01 * DEG / 9.80665),
+        # As data sheets and loggers write it; the last degree sign is the masculine ordinal.
+        ("250 dps", "rad/s", 250 * DEG),
+        ("70 mdps", "rad/s", 0.07 * DEG),
+        ("1 deg/sec", "rad/s", DEG),
+        ("2.7 deg/hr", "rad/s", 2.7 * DEG / 3600),
+        ("1 rad/sec", "rad/s", 1.0),
+        ("10 rpm", "rad/s", 20 * math.pi / 60),
+        ("5 mas/s", "rad/s", 5e-3 * DEG / 3600),
+        ("1 °/s", "rad/s", DEG),
+        ("1 º/s", "rad/s", DEG),
+        ("3 °/h", "rad/s", 3 * DEG / 3600),
+        ("25 °C", "K", 298.15),
+        ("131 LSB/dps", "LSB*s/rad", 131 / DEG),
     ],
 )
 def test_parse_converts_to_si(text, si, value):
@@ -50,7 +63,20 @@ def test_parse_converts_to_si(text, si, value):
     assert parse(text, si) == pytest.approx(value, rel=1e-14)
 
 
-@pytest.mark.parametrize("text", ["0.15 deg/sqrt(h)", "0.0025 deg/s/sqrt(Hz)", "0.0025 deg/sqrt(s)"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.15 deg/sqrt(h)",
+        "0.15 deg/sqrt(hr)",
+        "0.15 °/√h",
+        "0.15 º/√hr",
+        "0.0025 deg/s/sqrt(Hz)",
+        "2.5 mdps/sqrt(Hz)",
+        "2.5 mdps/√Hz",
+        "0.0025 °/s/√(Hz)",
+        "0.0025 deg/sqrt(s)",
+    ],
+)
 def test_parse_density_takes_the_cycle_as_a_number(text):
     # deg/sqrt(h) = deg / (60 sqrt(s)): 0.15 / 60 = 0.0025.
     assert parse(text, "rad*s^-0.5", cycle_is_number=True) == pytest.approx(0.0025 * DEG, rel=1e-14)
