@@ -21,7 +21,7 @@ BLOCK = 100_000
 
 
 def run(form: str, precision: str, n_time: int, **parameters: float) -> tuple[FloatArray, list[FloatArray]]:
-    """Return the rates [rad/s] and the covariances at the end of each tenth of the run, for white readings of 1 mrad/s."""
+    """Return the rates [rad/s] and the covariances after each tenth of the run, for white readings of 1 mrad/s."""
     stage = Kalman(load_belief("paper2"), RATES, KalmanParameters(form=form, precision=precision, **parameters))
     rng, rates, covariances = random_stream(1, "forms"), [], []
     for _ in range(10):
@@ -43,9 +43,8 @@ def setting() -> None:
     model = Kalman(load_belief("paper2"), RATES, KalmanParameters()).model
     print("belief paper2, modal realisation (states are parts of the reading), Van Loan, both sensors at 20 kHz")
     print(f"P0 = diag({', '.join(f'{value / DEG**2:.2g}' for value in np.diag(model.P0))}) (deg/s)^2 for order 1")
-    print(
-        f"R = {', '.join(f'{name} {value / DEG**2:.2g}' for name, value in zip(model.sensors, model.R, strict=True))} (deg/s)^2"
-    )
+    variances = [f"{name} {value / DEG**2:.2g}" for name, value in zip(model.sensors, model.R, strict=True)]
+    print(f"R = {', '.join(variances)} (deg/s)^2")
 
 
 def compare(label: str, n_time: int, **parameters: float) -> None:
@@ -57,7 +56,8 @@ def compare(label: str, n_time: int, **parameters: float) -> None:
         f"{np.linalg.cond(scaled(truth, truth)):.1e}"
     )
     print(
-        f"{'form':14s}{'precision':10s}{'lowest eigenvalue':>19s}{'of correlations':>17s}{'P off':>10s}{'rate off, deg/s':>17s}"
+        f"{'form':14s}{'precision':10s}{'lowest eigenvalue':>19s}{'of correlations':>17s}"
+        f"{'P off':>10s}{'rate off, deg/s':>17s}"
     )
     for form in ("conventional", "joseph", "square_root"):
         for precision in ("double", "single"):
@@ -67,7 +67,8 @@ def compare(label: str, n_time: int, **parameters: float) -> None:
             relative = np.linalg.eigvalsh(last)[0] if np.all(np.isfinite(last)) else np.nan
             off = np.abs(last - scaled(truth, truth)).max()
             print(
-                f"{form:14s}{precision:10s}{lowest:19.1e}{relative:17.1e}{off:10.1e}{np.abs(rate - reference).max() / DEG:17.1e}"
+                f"{form:14s}{precision:10s}{lowest:19.1e}{relative:17.1e}{off:10.1e}"
+                f"{np.abs(rate - reference).max() / DEG:17.1e}"
             )
 
 

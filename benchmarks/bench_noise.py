@@ -47,7 +47,7 @@ def medians(actions: Mapping[str, Callable[[], object]], repeats: int = 3) -> di
 
 
 def peer() -> FloatArray:
-    """Return N, B and K from allantools, its flicker by Kasdin and Walter's filter over an FFT (lengths of 2^k only)."""
+    """Return N, B and K from allantools, flicker by Kasdin and Walter's filter over an FFT (lengths of 2^k only)."""
     flicker = allantools.Noise(nr=2**24, qd=1e-5**2, b=-1)
     flicker.generateNoise()
     total: FloatArray = flicker.time_series[:N_TIME]

@@ -101,7 +101,7 @@ def medians(rates: Mapping[str, np.ndarray], forms: Mapping[str, Any], seeds: Se
 
 
 def objective_at_half_a_hertz(rate: np.ndarray, seeds: Sequence[int] = TUNING_SEEDS) -> Callable[..., float]:
-    """Return what tuning makes small: the median error [deg/s] of `shakf` with given parameters on the 0.5 Hz signal."""
+    """Return what tuning makes small: the median error [deg/s] of `shakf` with given parameters at 0.5 Hz."""
     records = [readings(rate, seed) for seed in seeds]
 
     def error(**own: Any) -> float:

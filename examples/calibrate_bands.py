@@ -64,8 +64,8 @@ def bands_file(levels: dict[str, np.ndarray]) -> str:
     lines = [
         "# Written by examples/calibrate_bands.py: N_k / dT at the band edges of a stepped sine of 1 deg/s,",
         (
-            f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and {EDGES_HZ[1]:g} "
-            f"Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:"
+            f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and "
+            f"{EDGES_HZ[1]:g} Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:"
         ),
         "# the limits hold for that amplitude only.",
     ]

@@ -208,7 +208,7 @@ def noise_and_gain(model: DriftModel, seeds: range) -> None:
 
 
 def searches(seed: int) -> None:
-    """Print what each search asks for the LSSVM's parameters, 284 rows of one cycle, blocked error and training error."""
+    """Print what each search asks for the LSSVM's parameters, 284 rows of a cycle, blocked error and training error."""
     rows = gather([cycle("up-first", 100 * seed).record], Features(), block=7200.0, most=300)
     bounds = ((10.0, 1e5), (1e-6, 1e6))
 

@@ -41,7 +41,7 @@ class Curves:
 
 
 def error_curves(field: float, freq_hz: NDArray[np.float64], height: float = HEIGHT) -> Curves:
-    """Return the errors at `field` [T]: |H_1 - 1| = a/sqrt(w^2 + a^2) of (6), |H - 1| of the full equation, |H_1 - H|."""
+    """Return the errors at `field` [T]: |H_1 - 1| = a/sqrt(w^2 + a^2) of (6), |H - 1| of the whole, |H_1 - H|."""
     channel = MhdChannel(fluid="mercury", height=height, field=field)
     one_mode, full = one_mode_response(channel, freq_hz), channel.response(freq_hz)
     rate = np.pi**2 * channel.fluid.kinematic_viscosity / height**2 + channel.braking_rate

@@ -211,10 +211,9 @@ def under_mismatch(seeds: Sequence[int]) -> None:
                 worst = float(np.max(error / np.hypot(ideal, forced)))
                 together = float(np.sqrt(np.mean(error**2) / np.mean(ideal**2 + forced**2)))
                 print(
-                    f"{sensor:>10} {key:>6} x {factor:4.2f}{freq:12.1f}{np.median(ideal):9.5f}{forced[0]:9.5f}"(
-                        f"{np.median(error):9.5f}{together:9.3f}{worst:10.3f}   "
-                        f"{'met' if worst <= 1.3 else 'MISSED in a run'}"
-                    ),
+                    f"{sensor:>10} {key:>6} x {factor:4.2f}{freq:12.1f}{np.median(ideal):9.5f}{forced[0]:9.5f}"
+                    f"{np.median(error):9.5f}{together:9.3f}{worst:10.3f}   "
+                    f"{'met' if worst <= 1.3 else 'MISSED in a run'}",
                     flush=True,
                 )
 

@@ -64,7 +64,7 @@ class RunError(RuntimeError):
 
 
 class UnknownNameError(ValueError):
-    """A name that no registry knows; the message lists the known ones and the nearest, or says why it cannot be loaded."""
+    """A name that no registry knows; the message lists the known ones and the nearest, or says why it fails to load."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], reason: str = "") -> None:
         names = sorted(known)

@@ -3,7 +3,8 @@
 Angle and cycle are dimensions of their own, so that `10 rad/s` is no frequency, `1 Hz` no rate and `4 mrad` no number.
 Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(Hz)` and `deg/sqrt(h)` are both
 rad/sqrt(s). A temperature is absolute in `degC` and `K`; in a compound unit such as `ppm/degC` both are the same step.
-`g0` is standard gravity, `g` a gram.
+`g0` is standard gravity, `g` a gram. What data sheets and logs write is read too: `dps`, `mdps`, `deg/sec`, `deg/hr`,
+`rpm`, `mas/s`, `°/s`, `°/√h`.
 
 A unit is terms joined by `*`, `/` or a blank. A term is a symbol, `1`, a unit in brackets or `sqrt(unit)`, with an
 exponent from -9 to 9 in halves, written `**`, `^` or bare: `m/s^2`, `rad s**-0.5`, `deg/s/sqrt(Hz)`. At most 64
@@ -37,7 +38,7 @@ milli- = 1e-3 = m-
 centi- = 1e-2 = c-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
-second = [time] = s
+second = [time] = s = sec
 meter = [length] = m
 gram = [mass] = g
 ampere = [current] = A
@@ -49,12 +50,15 @@ radian = [angle] = rad
 cycle = [cycle]
 count = [count] = LSB
 minute = 60 * second = min
-hour = 3600 * second = h
+hour = 3600 * second = h = hr
 day = 86400 * second
 degree = 3.141592653589793 / 180 * radian = deg
 arcminute = degree / 60 = arcmin
 arcsecond = degree / 3600 = arcsec
+milliarcsecond = degree / 3600000 = mas
 revolution = 2 * 3.141592653589793 * radian = rev
+dps = degree / second
+rpm = revolution / minute
 hertz = cycle / second = Hz
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
@@ -69,6 +73,8 @@ henry = volt * second / ampere = H
 farad = ampere * second / volt = F
 """
 
+# Spellings of data sheets: the degree sign, the ordinal sign that looks like it, the root sign.
+_SPELLINGS = ((re.compile(r"[°º]"), "deg"), (re.compile(r"√\s*(\w+)"), r"sqrt(\1)"), (re.compile(r"√\s*\("), "sqrt("))
 _ICE_POINT = Decimal("273.15")
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)\w*)\s*(.*)", re.IGNORECASE | re.DOTALL
@@ -164,7 +170,7 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     if match is None:
         msg = f"{expected}, got {quoted(text)}"
         raise ValueError(msg)
-    number, unit = float(match[1]), match[2].strip()
+    number, unit = float(match[1]), _plain(match[2].strip())
     if not math.isfinite(number):
         msg = f"{expected}, got {quoted(text)}, which is not finite"
         raise ValueError(msg)
@@ -183,6 +189,13 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
         msg = f"{expected}, got {quoted(text)}, which is not finite"
         raise ValueError(msg)
     return value
+
+
+def _plain(unit: str) -> str:
+    """Return a unit with the signs of data sheets spelt out: `°/√h` is `deg/sqrt(h)`."""
+    for sign, words in _SPELLINGS:
+        unit = sign.sub(words, unit)
+    return unit
 
 
 def _expectation(si: str, example: str) -> str:
@@ -233,7 +246,7 @@ class Quantity:
             msg = f"{_expectation(self.unit, self.example)}, got {quoted(value)}"
             raise ValueError(msg)
         if border and self.unit:
-            msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {quoted(value)}: the unit is missing"
+            msg = f"{_expectation(self.unit, self.example)}, got {quoted(value)}: the unit is missing"
             raise ValueError(msg)
         try:
             return float(value)

@@ -44,6 +44,19 @@ DEG = math.pi / 180
         ("0.02 %/K", "K^-1", 2e-4),
         ("0.005 deg/s/K", "rad/s/K", 0.005 * DEG),
         ("0.01 deg/s/g0", "rad*s/m", 0.01 * DEG / 9.80665),
+        # As data sheets and loggers write it; the last degree sign is the masculine ordinal.
+        ("250 dps", "rad/s", 250 * DEG),
+        ("70 mdps", "rad/s", 0.07 * DEG),
+        ("1 deg/sec", "rad/s", DEG),
+        ("2.7 deg/hr", "rad/s", 2.7 * DEG / 3600),
+        ("1 rad/sec", "rad/s", 1.0),
+        ("10 rpm", "rad/s", 20 * math.pi / 60),
+        ("5 mas/s", "rad/s", 5e-3 * DEG / 3600),
+        ("1 °/s", "rad/s", DEG),
+        ("1 º/s", "rad/s", DEG),
+        ("3 °/h", "rad/s", 3 * DEG / 3600),
+        ("25 °C", "K", 298.15),
+        ("131 LSB/dps", "LSB*s/rad", 131 / DEG),
     ],
 )
 def test_parse_converts_to_si(text, si, value):
@@ -51,7 +64,20 @@ def test_parse_converts_to_si(text, si, value):
     assert parse(text, si) == pytest.approx(value, rel=1e-14)
 
 
-@pytest.mark.parametrize("text", ["0.15 deg/sqrt(h)", "0.0025 deg/s/sqrt(Hz)", "0.0025 deg/sqrt(s)"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.15 deg/sqrt(h)",
+        "0.15 deg/sqrt(hr)",
+        "0.15 °/√h",
+        "0.15 º/√hr",
+        "0.0025 deg/s/sqrt(Hz)",
+        "2.5 mdps/sqrt(Hz)",
+        "2.5 mdps/√Hz",
+        "0.0025 °/s/√(Hz)",
+        "0.0025 deg/sqrt(s)",
+    ],
+)
 def test_parse_density_takes_the_cycle_as_a_number(text):
     # deg/sqrt(h) = deg / (60 sqrt(s)): 0.15 / 60 = 0.0025.
     assert parse(text, "rad*s^-0.5", cycle_is_number=True) == pytest.approx(0.0025 * DEG, rel=1e-14)
@@ -93,7 +119,14 @@ def test_parse_refuses_nonsense_and_says_what_was_expected(text):
 
 
 # Symbols with their size in SI and their dimension (length, time, angle), by hand: the oracle of the grammar.
-SYMBOLS = {"m": (1.0, 1, 0, 0), "mm": (1e-3, 1, 0, 0), "s": (1.0, 0, 1, 0), "h": (3600.0, 0, 1, 0), "rad": (1.0, 0, 0, 1), "deg": (DEG, 0, 0, 1)}  # fmt: skip
+SYMBOLS = {
+    "m": (1.0, 1, 0, 0),
+    "mm": (1e-3, 1, 0, 0),
+    "s": (1.0, 0, 1, 0),
+    "h": (3600.0, 0, 1, 0),
+    "rad": (1.0, 0, 0, 1),
+    "deg": (DEG, 0, 0, 1),
+}
 HALVES = [i / 2 for i in range(-6, 7) if i]
 
 
@@ -106,8 +139,10 @@ def powers(atom):
     written = st.sampled_from(["**", "^", " ^ ", ""])
     return st.one_of(
         atom,
-        st.tuples(atom, st.sampled_from(HALVES), written).map(lambda p: (f"{p[0][0]}{p[2]}{p[1]:g}", raised(p[0][1], p[1]))),
-    )  # fmt: skip
+        st.tuples(atom, st.sampled_from(HALVES), written).map(
+            lambda p: (f"{p[0][0]}{p[2]}{p[1]:g}", raised(p[0][1], p[1]))
+        ),
+    )
 
 
 def product_of(atom):
@@ -151,7 +186,28 @@ def test_parse_of_any_unit_of_the_grammar_is_its_product(unit):
 
 
 @pytest.mark.property
-@given(two_levels, st.sampled_from(["({})**9**9", "{}^10", "{}^-9.5", "{}^0.3", "({}", "{})", "((({})))", "{}//s", "{}*", "{} 2", "{}^s", "{}+s", "{}.s", "{},s", "{}²"]))  # fmt: skip
+@given(
+    two_levels,
+    st.sampled_from(
+        [
+            "({})**9**9",
+            "{}^10",
+            "{}^-9.5",
+            "{}^0.3",
+            "({}",
+            "{})",
+            "((({})))",
+            "{}//s",
+            "{}*",
+            "{} 2",
+            "{}^s",
+            "{}+s",
+            "{}.s",
+            "{},s",
+            "{}²",
+        ]
+    ),
+)
 def test_parse_refuses_a_unit_beside_the_grammar(unit, damage):
     """One level more than a text with two levels has, a power of a power, a number: refused before it is worked out."""
     text = damage.format(unit[0])

@@ -29,7 +29,7 @@ _TABLE_WIDTH, _LINE_WIDTH = 61, 31
 
 @contextmanager
 def progress(name: str, duration: float) -> Iterator[Callable[[float], None]]:
-    """Show progress on standard error: a bar with rate and remaining time, or plain lines where there is no terminal."""
+    """Show progress on standard error: a bar with rate and remaining time, or plain lines without a terminal."""
     if sys.stderr.isatty():
         with _bar() as bar:
             task = bar.add_task(name, total=duration, speed="")

@@ -35,11 +35,13 @@ def ceemdan(
     With M the local mean, E_k the k-th mode by `emd`, w_i white noise of unit variance and :math:`r_0 = x`, the
     improved variant [1]_ is
 
-    .. math:: r_k = \langle M(r_{k-1} + \beta_{k-1} E_k(w_i)) \rangle, \quad d_k = r_{k-1} - r_k, \quad \beta_k = \epsilon\,\sigma(r_k)
+    .. math:: r_k = \langle M(r_{k-1} + \beta_{k-1} E_k(w_i)) \rangle, \quad d_k = r_{k-1} - r_k,
+        \quad \beta_k = \epsilon\,\sigma(r_k)
 
     with :math:`E_1(w_i)` divided by its standard deviation; the classic one [2]_ (equations 1-6 of [3]_) is
 
-    .. math:: d_k = \langle E_1(r_{k-1} + \beta_{k-1} E_{k-1}(w_i)) \rangle, \quad r_k = r_{k-1} - d_k, \quad E_0(w) = w .
+    .. math:: d_k = \langle E_1(r_{k-1} + \beta_{k-1} E_{k-1}(w_i)) \rangle, \quad r_k = r_{k-1} - d_k,
+        \quad E_0(w) = w .
 
     A noise that has no mode left adds nothing. The end is that of `emd`. Each trial has a random stream of its own; the
     result has the same bits for any number of threads.

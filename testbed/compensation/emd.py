@@ -190,7 +190,8 @@ def emd(signal: FloatArray, *, sifts: int = 10) -> FloatArray:
 
     References
     ----------
-    .. [1] Huang et al., "The empirical mode decomposition and the Hilbert spectrum", Proc. R. Soc. A 454, 1998, 903-995.
+    .. [1] Huang et al., "The empirical mode decomposition and the Hilbert spectrum", Proc. R. Soc. A 454, 1998,
+       903-995.
     .. [2] Wang, Cui, Cao, Micromachines 14, 2023, 1712.
     """
     residual = checked_signal(signal)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @njit(cache=True)
 def _expand(X, support, weights, bias, width2):  # pragma: no cover
-    """Return sum_i a_i exp(-|x - x_i|^2 / 2 s^2) + b of each row, in an order that does not depend on the other rows."""
+    """Return sum_i a_i exp(-|x - x_i|^2 / 2 s^2) + b of each row, in an order independent of the other rows."""
     n_row, n_feature = X.shape
     y = np.empty(n_row)
     for k in range(n_row):

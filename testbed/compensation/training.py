@@ -195,7 +195,7 @@ def fit_process(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
 
 
 def _least_squares(U: FloatArray, y: FloatArray, n_free: int, folds: list[slice]) -> tuple[FloatArray, float]:
-    """Return the weights under the penalty of least blocked error, and that error; the first columns are not penalised."""
+    """Return the weights under the penalty of least blocked error, and that error; the first columns are free."""
     ridges = [y.size * penalty * (np.arange(U.shape[1]) >= n_free) for penalty in _PENALTIES]
     errors = [_rms(polynomial.block_residuals(U, y, ridge, folds)) for ridge in ridges]
     best = int(np.argmin(errors))

@@ -1,4 +1,4 @@
-"""The audit of a compensation: what it removes, what survives of true rate, and whether it learned what it was to keep."""
+"""The audit of a compensation: what it removes, what survives of true rate, whether it learned what it should keep."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ class Audit:
         ratio = self.oracle_ratio
         if ratio is not None and ratio < LEAST_ORACLE_RATIO:
             yield (
-                f"the Allan deviation at 1 h is {ratio:.2f} of what removing the true drift leaves, expected at least {LEAST_ORACLE_RATIO}: "
-                "noise or true rate went along with the drift"
+                f"the Allan deviation at 1 h is {ratio:.2f} of what removing the true drift leaves, expected at least "
+                f"{LEAST_ORACLE_RATIO}: noise or true rate went along with the drift"
             )
 
 
@@ -160,7 +160,10 @@ def audit(
     periods = usable_periods(record.rate.size, fs)
     if not periods or periods[-1] < DRIFT_PERIOD:
         least = 2.0 * next(period for period in PERIODS if period >= DRIFT_PERIOD)
-        msg = f"record: expected at least {least:g} s, so that a slow rate can be told from drift, got {record.rate.size / fs:g} s"
+        msg = (
+            f"record: expected at least {least:g} s, so that a slow rate can be told from drift, "
+            f"got {record.rate.size / fs:g} s"
+        )
         raise ValueError(msg)
     gains, step_gain, earth_gain = _survival(compensate, record, plain, periods, tell)
     tell("fitting Allan curves")

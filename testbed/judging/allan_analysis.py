@@ -82,12 +82,15 @@ class Analysis:
         """Return what the goodness of fit says, in a sentence."""
         worth = self.fit.goodness
         low, high = self.fitted.tau[[0, -1]]
-        numbers = f"reduced chi-square {worth.reduced_chi_square:.2f} with {worth.freedom:.1f} degrees of freedom, p = {worth.p_value:.2g}"
+        numbers = (
+            f"reduced chi-square {worth.reduced_chi_square:.2f} with {worth.freedom:.1f} degrees of freedom, "
+            f"p = {worth.p_value:.2g}"
+        )
         if worth.accepted:
             return f"The five terms describe the curve from {low:g} s to {high:g} s: {numbers}."
         return (
-            f"The five terms do NOT describe the curve from {low:g} s to {high:g} s ({numbers}; worst at {worth.worst_tau:g} s), "
-            f"so no coefficient is given. {self._advice()}"
+            f"The five terms do NOT describe the curve from {low:g} s to {high:g} s ({numbers}; "
+            f"worst at {worth.worst_tau:g} s), so no coefficient is given. {self._advice()}"
         )
 
     def _advice(self) -> str:
@@ -136,7 +139,10 @@ def analyse(record: Record, min_tau: float | None = None, max_tau: float | None 
         raise ScenarioError([Problem(f"expected noise, got no deviation at all at {silent:g} s", file=record.content)])
     fitted = curve.between(min_tau or 0.0, np.inf if max_tau is None else max_tau)
     if fitted.tau.size < len(TERMS):
-        msg = f"expected at least {len(TERMS)} averaging times, got {fitted.tau.size} of those from {curve.tau[0]:g} s to {curve.tau[-1]:g} s"
+        msg = (
+            f"expected at least {len(TERMS)} averaging times, got {fitted.tau.size} of those "
+            f"from {curve.tau[0]:g} s to {curve.tau[-1]:g} s"
+        )
         raise ScenarioError([Problem(msg, key="--min-tau, --max-tau", file=record.content)])
     try:
         return Analysis(record, curve, fitted, fit_allan(fitted))

@@ -29,7 +29,8 @@ _INNOVATION, _VARIANCE = "innovation_", "innovation_variance_"
 class Whiteness:
     r"""Sums over the normalised innovations :math:`\nu_k = e_k / \sqrt{C_k}` of one sensor, those in a gap left out.
 
-    .. math:: \mathrm{NIS} = \langle \nu^2 \rangle, \qquad \rho_l = \sum \nu_k \nu_{k-l} / \sum \nu_k^2, \; l = 1 \ldots 10
+    .. math:: \mathrm{NIS} = \langle \nu^2 \rangle, \qquad
+        \rho_l = \sum \nu_k \nu_{k-l} / \sum \nu_k^2, \; l = 1 \ldots 10
 
     Only sums and the last ten values are kept, so memory does not grow.
     """

@@ -1,4 +1,4 @@
-"""The static report of a run: one HTML page with its table, figures, scenario and definitions, that needs nothing else."""
+"""The static report of a run: one HTML page with table, figures, scenario and definitions, that needs nothing else."""
 
 from __future__ import annotations
 

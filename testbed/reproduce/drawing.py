@@ -1,4 +1,4 @@
-"""Figures for print: panels as wide as a journal's column, drawn in the house's style and saved beside their numbers."""
+"""Figures for print: panels as wide as a journal's column, drawn in the house style and saved beside their numbers."""
 
 from __future__ import annotations
 

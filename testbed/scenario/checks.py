@@ -13,7 +13,7 @@ from testbed.scenario.model import METRICS
 from testbed.scenario.step_choice import given_step
 
 if TYPE_CHECKING:
-    from testbed.scenario.document import Document
+    from testbed.document import Document
     from testbed.scenario.model import Scenario
 
 _BLOCK = 20_000
@@ -35,7 +35,8 @@ def _check_times(scenario: Scenario, document: Document) -> None:
     if frame.settle >= frame.duration:
         document.find(
             ("settle",),
-            f"expected less than the duration {frame.duration:g} s, got {frame.settle:g} s: no time is left for the metrics",
+            f"expected less than the duration {frame.duration:g} s, got {frame.settle:g} s: "
+            "no time is left for the metrics",
         )
     base = scenario.base_rate_hz
     if scenario.n_time < 1 or abs(scenario.n_time / base - frame.duration) > 1e-9 * frame.duration:
@@ -120,8 +121,8 @@ def _check_motion(scenario: Scenario, document: Document) -> None:
             if top >= sensor.sample_rate / 2:
                 document.find(
                     ("motion", i, kind),
-                    f"contains {top:g} Hz, but {name} at {sensor.sample_rate:g} Hz sees only what is below {sensor.sample_rate / 2:g} Hz: "
-                    "lower the frequency or raise the sample rate",
+                    f"contains {top:g} Hz, but {name} at {sensor.sample_rate:g} Hz sees only what is below "
+                    f"{sensor.sample_rate / 2:g} Hz: lower the frequency or raise the sample rate",
                 )
     if not document.problems:
         _check_reach(scenario, document)
@@ -138,13 +139,15 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
         if peak_rate > sensor.full_scale():
             document.find(
                 ("motion",),
-                f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, +-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
+                f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, "
+                f"+-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
             )
     limit = scenario.turntable.torque_limit
     if scenario.turntable.has_plant and peak_torque > limit:
         document.find(
             ("motion",),
-            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: reduce the amplitude or use turntable mode 'ideal'",
+            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: "
+            "reduce the amplitude or use turntable mode 'ideal'",
         )
 
 

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from testbed.document import Document, unknown_key
 from testbed.errors import UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
@@ -13,7 +14,6 @@ from testbed.models.motions import MOTIONS
 from testbed.models.turntable.turntable import TurntableParameters
 from testbed.parts import merge, preset, resolve
 from testbed.scenario.checks import cross_check
-from testbed.scenario.document import Document, unknown_key
 from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
 from testbed.sensors import SENSORS
 

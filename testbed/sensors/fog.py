@@ -206,7 +206,7 @@ class Settled:
 
 @njit(cache=True)
 def run_mean(u, state, y):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Fill `y` with the means of the intervals that end in `u`; return how many. State = [sum, samples in it, ratio]."""
+    """Fill `y` with the means of the intervals that end in `u`; return how many. State: [sum, samples, ratio]."""
     n = 0
     for k in range(u.size):
         state[0] += u[k]

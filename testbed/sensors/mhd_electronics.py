@@ -56,7 +56,7 @@ class Transformer(Part):
         return response
 
     def start(self, sample_rate_hz: float) -> LinearFilter:
-        """Return the transformer at rest: exact for an input that is linear between samples, which errs on H - 1 only."""
+        """Return the transformer at rest: exact for an input linear between samples, which errs on H - 1 only."""
         return LinearFilter([1.0, 0.0], [1.0, 2.0 * np.pi * self.corner_freq_hz], sample_rate_hz)
 
 

@@ -127,7 +127,7 @@ def test_fit_recovers_the_coefficients_of_an_exact_curve() -> None:
 def test_columns_are_the_integral_over_the_density(
     name: str, density: Callable[[FloatArray], FloatArray], end: float, tail: float
 ) -> None:
-    """Judge the closed forms by the integral of IEEE Std 952, 4 S(f) sin^4(pi f tau) / (pi f tau)^2 df, at tau = 1 s."""
+    """Judge the closed forms by IEEE Std 952's integral, 4 S(f) sin^4(pi f tau) / (pi f tau)^2 df, at tau = 1 s."""
     f = (np.arange(round(end * 200)) + 0.5) / 200.0
     integral = np.sum(4.0 * density(f) * np.sin(np.pi * f) ** 4 / (np.pi * f) ** 2) / 200.0
     # Beyond `end` the mean of sin^4, 3/8, counts; `tail` is the integral of S / f^2.
@@ -258,7 +258,7 @@ def test_intervals_cover_the_coefficients_of_a_preset(
 @pytest.mark.slow
 @pytest.mark.oracle
 def test_limits_and_intervals_hold_at_the_edge_of_what_is_seen() -> None:
-    """1000 s show the preset's flicker half the time: what is seen or not depends on chance, what is claimed must hold."""
+    """1000 s show the preset's flicker half the time: what is seen depends on chance, what is claimed must hold."""
     true = preset_terms()
     shown, limits, below = 0, 0, 0
     for seed in range(200):

@@ -94,7 +94,7 @@ def test_any_block_gives_the_same_bits(tmp_path):
 
 
 def test_allan_takes_the_thermal_bias_off(tmp_path):
-    """The record for `testbed allan` is the noise: what is left after the noise-free reading of the same temperatures."""
+    """The record for `testbed allan` is the noise: the reading less the noise-free one at the same temperatures."""
     scenario = load(tmp_path)
     testbed.run(scenario, out=tmp_path / "run")
     record = read_run(tmp_path / "run")[0]
@@ -105,7 +105,7 @@ def test_allan_takes_the_thermal_bias_off(tmp_path):
 
 @pytest.mark.oracle
 def test_injected_rate_is_read_as_it_is(tmp_path):
-    """Earth rate, a step and sines of 10 s, 10 min and 6 h through `motion`, noise off, at the reference temperature."""
+    """Earth rate, a step and sines of 10 s, 10 min, 6 h through `motion`, noise off, at the reference temperature."""
     freq = [0.1, 1 / 600, 1 / 21_600]
     edits = [
         ("{start: 20 degC, steps: [{hold: 100 s}, {ramp: 40 degC, rate: 1 K/min}]}", "20 degC"),

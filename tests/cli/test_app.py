@@ -84,8 +84,21 @@ def test_bad_scenario_ends_with_2_and_every_finding(tmp_path, command):
 
 
 @pytest.mark.parametrize(
-    "arguments", [("run",), ("run", "missing.yaml"), ("run", "."), ("nonsense",), ("check", "missing.yaml"), ("report", "."), ("report", "nowhere"), ("run", "short.yaml", "--block", "0"), ("run", "short.yaml", "--seed", "-1"), ("view", "nowhere")], ids=" ".join
-)  # fmt: skip
+    "arguments",
+    [
+        ("run",),
+        ("run", "missing.yaml"),
+        ("run", "."),
+        ("nonsense",),
+        ("check", "missing.yaml"),
+        ("report", "."),
+        ("report", "nowhere"),
+        ("run", "short.yaml", "--block", "0"),
+        ("run", "short.yaml", "--seed", "-1"),
+        ("view", "nowhere"),
+    ],
+    ids=" ".join,
+)
 def test_bad_calls_end_with_2(tmp_path, arguments):
     short_file(tmp_path)
     assert_clear(call(*arguments, cwd=tmp_path), 2)

@@ -30,7 +30,7 @@ def test_envelope_is_scipys_spline(n_knot):
 @pytest.mark.oracle
 @pytest.mark.parametrize("n_time", [12, 20, 30, 50, 80, 300, 3000])
 def test_modes_are_those_of_the_peer(n_time):
-    """Short records meet every case of the mirror at the ends; ten sifts of some ten modes amplify rounding a little."""
+    """Short records meet every case of the mirror at the ends; ten sifts of ten modes amplify rounding a little."""
     for seed in range(20 if n_time < 100 else 2):
         signal = noisy_tone(n_time, seed)
         ours, theirs = emd(signal), peer_modes(signal)
@@ -61,7 +61,7 @@ def test_modes_add_up_to_the_signal():
 
 @pytest.mark.property
 def test_modes_scale_with_the_signal():
-    """No absolute threshold hides in SI units: 1e-9 rad/s decomposes as 1 rad/s does, bit for bit for a power of two."""
+    """No absolute threshold hides in SI units: 1e-9 rad/s decomposes as 1 rad/s, bit for bit for a power of two."""
     signal = noisy_tone(700, 4)
     assert np.array_equal(emd(2.0**-30 * signal), 2.0**-30 * emd(signal))
 

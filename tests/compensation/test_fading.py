@@ -81,7 +81,7 @@ def test_factor_of_the_paper_divides_the_ratio_by_19_to_1740():
 @pytest.mark.oracle
 @pytest.mark.parametrize("q", [1e-3, 0.1])
 def test_ratio_of_a_random_walk_is_found(rng, q):
-    """About n K independent values in n samples, K = sqrt(q): ln q spreads by sqrt(2 / n K), 0.056; the grid adds 0.19."""
+    """About n K independent values in n samples, K = sqrt(q): ln q spreads by sqrt(2 / n K), 0.056; grid 0.19."""
     assert np.log(choose_ratio(walk(rng, q, 20_000)) / q) == pytest.approx(0.0, abs=4.0 * 0.056 + 0.19)
 
 

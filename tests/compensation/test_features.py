@@ -65,7 +65,7 @@ def test_slope_of_a_ramp_is_its_rate():
 @pytest.mark.oracle
 @pytest.mark.parametrize("rate", [0.0, 1e-4 / 60.0, 0.1 / 60.0, 1.0 / 60.0])
 def test_steps_of_the_thermometer_stay_below_the_stated_slope_error(rate):
-    """A single step is the worst case; a ramp's steps average out. Rounding is less than one step of error per change."""
+    """A single step is the worst case; a ramp's steps average out. Rounding errs by less than a step per change."""
     T = 293.15 + rate * np.arange(20_000.0)
     T[10_000:] += 0.04  # carries a steady temperature over one step
     read = np.round(T / 0.0625) * 0.0625

@@ -25,7 +25,7 @@ def examine(compensate, record, *more, **options):
 
 @pytest.fixture(scope="module")
 def cycle():
-    """Give a drift that follows temperature, with a thermometer that is believed, and the noise of a fibre-optic gyro."""
+    """Give a drift that follows temperature, with a believed thermometer and the noise of a fibre-optic gyro."""
     t = sample_times(0, N_TIME, FS)
     temperature = 293.0 + 30.0 * np.sin(2.0 * np.pi * t / t[-1])
     drift = 0.1 * DEG_H * ((temperature - 293.0) / 30.0) ** 3 + 0.1 * DEG_H * np.cos(2.0 * np.pi * t / t[-1])
@@ -47,7 +47,7 @@ def test_removing_the_true_drift_passes_with_every_rate_intact(cycle):
 
 
 def test_learning_the_record_as_a_function_of_time_is_a_leak(cycle):
-    """A smoother of the record subtracted from it: what a regression does that can tell every moment from every other."""
+    """A smoother of the record subtracted from it: what a regression does that can tell all moments apart."""
     record, drift = cycle
     found = examine(lambda of: of.rate - low_pass(of.rate, FS, 1.0 / 1800.0), record, drift)
     assert found.oracle_ratio < 0.7

@@ -72,7 +72,7 @@ def loaded(folder):
 
 
 class Rows(HTMLParser):
-    """Collect the numbers of each table row by its heading: the value of <data>, or None for a dash; and what is bold."""
+    """Collect the numbers of each table row by its heading: the value of <data>, None for a dash; and what is bold."""
 
     def __init__(self, text):
         super().__init__()

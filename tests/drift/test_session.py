@@ -73,8 +73,9 @@ def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
     """A truth of 20 kHz, readings at 400 Hz: the drift at the instant of each reading, by interpolation over time."""
     scene = tmp_path / "table.yaml"
     scene.write_text(
-        "name: table\nduration: 1 s\nturntable: {mode: ideal}\ntemperature: {start: 20 degC, stop: 80 degC, over: 1 s}\n"
-        "motion: [static: {}]\nsensors: {fog: {preset: fog_paper3}}\n"
+        "name: table\nduration: 1 s\nturntable: {mode: ideal}\n"
+        "temperature: {start: 20 degC, stop: 80 degC, over: 1 s}\nmotion: [static: {}]\n"
+        "sensors: {fog: {preset: fog_paper3}}\n"
     )
     run = testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
     found = read(tmp_path / "run", Columns())
@@ -158,7 +159,7 @@ def test_the_audit_of_a_text_file_needs_no_truth(table, model, tmp_path):
 
 
 def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
-    """A compensation that trains on the record it corrects, here a plain smoother in the place of the paper's pipeline."""
+    """A compensation that trains on the record it corrects, here a smoother in the place of the paper's pipeline."""
     from testbed.drift.quality import low_pass
 
     class Result:
@@ -284,7 +285,7 @@ def test_every_command_says_what_it_read(cycles, model, table, tmp_path, monkeyp
 
 
 def test_a_model_audited_on_its_training_record_is_a_leak(cycles, tmp_path, monkeypatch, capsys):
-    """A frozen model lets every known rate pass, also on the record it has learned: only the record's identity tells."""
+    """A frozen model lets known rates pass, also on the record it has learned: only the record's identity tells."""
     ends_with(["train", cycles / "up", "--out", tmp_path / "one.json"], monkeypatch, capsys)
     status, text = ends_with(
         ["audit", tmp_path / "one.json", cycles / "up", "--out", tmp_path / "a"], monkeypatch, capsys

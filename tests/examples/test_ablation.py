@@ -1,4 +1,4 @@
-"""The ablation: its forms are what their names say, and on short runs they work and fail where docs/ablation.md says."""
+"""The ablation: forms are what their names say, and on short runs they work and fail where docs/ablation.md says."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def test_the_search_follows_the_grid_to_a_minimum() -> None:
 
 @pytest.mark.parametrize("label", ["mixed", "100 Hz", "wheel run-up"])
 def test_close_to_the_best_fixed_filter(label: str) -> None:
-    """1.15 is promised for the median over ten seeds; two seeds of 4 s scatter more at low frequency, hence 1.3 there."""
+    """1.15 is promised for the median over ten seeds; two seeds of 4 s scatter more at low frequency: 1.3 there."""
     found = example.judge(label, (31, 32), 4.0)
     assert found.ratio <= (1.15 if label == "100 Hz" else 1.3)
     assert found.wideband <= 0.0035

@@ -142,7 +142,7 @@ def literal_filter(
 
 
 def linear_sensors(rate: FloatArray, seed: int, *, noise: bool = True) -> dict[str, FloatArray]:
-    """Return the readings of both sensors of (39) for a true rate at 20 kHz, with the presets' noise and word length."""
+    """Return the readings of both sensors of (39) for a true rate at 20 kHz, with the presets' noise and words."""
     n, fs = rate.size, RATES["mhd_ars"]
     gyro_noise = 0.15 / 60.0 * DEG * math.sqrt(fs) * random_stream(seed, "gyro").standard_normal(n)
     mhd_noise = 1e-7 * math.sqrt(fs) * random_stream(seed, "mhd").standard_normal(n)

@@ -39,7 +39,7 @@ def white_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def still_run(tmp_path_factory):
-    """Return a run whose table moves by 1 deg/s at 10 Hz, with a gyro that follows badly: its dynamics must not show."""
+    """Return a run whose table moves by 1 deg/s at 10 Hz, with a gyro that lags: its dynamics must not show."""
     folder = tmp_path_factory.mktemp("runs")
     path = short_file(folder, ("duration: 0.5 s", "duration: 1.5 s"))
     testbed.run(testbed.load_scenario(path), out=folder / "run")
@@ -49,7 +49,8 @@ def still_run(tmp_path_factory):
 def test_table_shows_estimates_intervals_and_limits(tmp_path, white_file):
     result = call("allan", white_file, "--column", "rate", "--unit", "deg/s", "--rate", "100", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    rows = {line.split("│")[1].strip(): [cell.strip() for cell in line.split("│")[2:-1]] for line in result.stdout.splitlines() if "│" in line}  # fmt: skip
+    cells = [[cell.strip() for cell in line.split("│")[1:-1]] for line in result.stdout.splitlines() if "│" in line]
+    rows = {name: rest for name, *rest in cells}
     name, value, interval, unit, si, si_unit = rows["N"]
     low, high = map(float, interval.split(" to "))
     # 50 000 white samples: N is known to about 1/sqrt(2 n) = 0.3 %; five times that.
@@ -79,8 +80,18 @@ def test_time_column_and_format(tmp_path, white_file, suffix):
 
 @pytest.mark.parametrize(
     "options",
-    [(), ("--unit", "deg/s"), ("--unit", "m", "--rate", "1"), ("--unit", "deg/s", "--rate", "100"), ("--unit", "deg/s", "--rate", "100", "--column", "rat"), ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--out", "a.jpg"), ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--min-tau", "100"), ("--sensor", "gyro")], ids=" ".join
-)  # fmt: skip
+    [
+        (),
+        ("--unit", "deg/s"),
+        ("--unit", "m", "--rate", "1"),
+        ("--unit", "deg/s", "--rate", "100"),
+        ("--unit", "deg/s", "--rate", "100", "--column", "rat"),
+        ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--out", "a.jpg"),
+        ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--min-tau", "100"),
+        ("--sensor", "gyro"),
+    ],
+    ids=" ".join,
+)
 def test_bad_calls_end_with_2_and_leave_nothing(tmp_path, white_file, options):
     assert_clear(call("allan", white_file, *options, cwd=tmp_path), 2)
     assert not list(tmp_path.iterdir())
@@ -131,7 +142,10 @@ def test_the_record_of_a_run_begins_after_settling(still_run):
 
 def test_a_gap_in_the_readings_is_refused(still_run, monkeypatch):
     run = testbed.open_run(still_run)
-    sensors = {name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate)) for name, s in run.sensors.items()}  # fmt: skip
+    sensors = {
+        name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate))
+        for name, s in run.sensors.items()
+    }
     monkeypatch.setattr("testbed.runs.folder.open_run", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth))
     with pytest.raises(ScenarioError, match="without gaps, got 1 that are missing"):
         read_run(still_run, "mems_gyro")
@@ -198,7 +212,10 @@ def test_records_without_noise_or_length_are_refused(rate, message):
 
 
 def test_figure_shows_band_sum_and_each_term():
-    analyses = [analyse(record(angle_random_walk=N, rate_random_walk=5e-5)), analyse(record(markov_bias=B, markov_time=0.3))]  # fmt: skip
+    analyses = [
+        analyse(record(angle_random_walk=N, rate_random_walk=5e-5)),
+        analyse(record(markov_bias=B, markov_time=0.3)),
+    ]
     figure = allan_figure(analyses)
     first, second = figure.axes
     labels = first.get_legend_handles_labels()[1]

@@ -1,4 +1,4 @@
-"""The report of a run: its numbers are those of metrics.json, its figures those of run.nc, and it is never half there."""
+"""The report of a run: its numbers are those of metrics.json, its figures those of run.nc, it is never half there."""
 
 from __future__ import annotations
 

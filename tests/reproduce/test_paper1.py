@@ -84,7 +84,7 @@ def test_sensors_alone_follow_their_transfer_functions() -> None:
 
 
 def test_the_truth_is_the_table_under_its_servo() -> None:
-    """It follows the command but for the recoil of the platform, 0.11 % of the rate (I_rotor / I_platform = 0.05 / 45)."""
+    """It follows the command but for the platform's recoil, 0.11 % of the rate (I_rotor / I_platform = 0.05 / 45)."""
     rate = truth("10 Hz", SHORT)
     terms = [sine.start(2.0, np.random.default_rng()) for sine in SIGNALS["10 Hz"]]
     command = MotionProfile(terms, 0.5, BASE_HZ).process(rate.size).rate[:-1]

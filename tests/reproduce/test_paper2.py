@@ -207,8 +207,8 @@ def test_no_fused_rate_is_less_noisy_at_a_judged_line_than_the_mhd_ars() -> None
     """Linearity "no worse" cannot be had to the letter.
 
     With G from the gyro and (1 - G)/H from the MHD ARS, which any flat scale factor asks for, the noise over the MHD
-    ARS's is
-    |1 - G|^2 + |G|^2 S_gyro/S_mhd. Its least value over all G is 1/(1 + S_mhd/S_gyro), and for the first-order handover G = 1/(1 + jf/f_c) it is above 1 for every f_c, since Re G = |G|^2.
+    ARS's is |1 - G|^2 + |G|^2 S_gyro/S_mhd. Its least value over all G is 1/(1 + S_mhd/S_gyro), and for the first-order
+    handover G = 1/(1 + jf/f_c) it is above 1 for every f_c, since Re G = |G|^2.
     """
     f = 2.0
     ratio = (

@@ -125,7 +125,7 @@ def check_white() -> None:
 
 
 def check_electronic() -> None:
-    """Compare white and 1/f noise of an amplifier with their closed-form Allan variances, each alone, at three rates."""
+    """Compare white and 1/f noise of an amplifier with closed-form Allan variances, each alone, at three rates."""
     n, m, density = 200_000, 64, 1e-7
     spread = 5.0 * math.sqrt(2.0 / equivalent_freedom(m, n + 1, -1))
     for fs in RATES:

@@ -177,9 +177,9 @@ class FrequencyIndicator:
     r"""Frequency of the signal from two sensors, online, the same for every amplitude.
 
     By increments, from each sensor alone: the ratio of two energies at one lag, :math:`f = \theta / (2 \pi L T)`. By
-    comparing both sensors:
-    :math:`\Psi_a / \Psi_b = |H_a(f)|^2 / |H_b(f)|^2`, solved for f with the believed responses, over the frequencies where that ratio rises.
-    Energies are means with an exponential memory, less what the believed noise adds.
+    comparing both sensors: :math:`\Psi_a / \Psi_b = |H_a(f)|^2 / |H_b(f)|^2`, solved for f with the believed responses,
+    over the frequencies where that ratio rises. Energies are means with an exponential memory, less what
+    the believed noise adds.
 
     Parameters
     ----------

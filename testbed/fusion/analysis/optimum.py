@@ -211,7 +211,7 @@ def settled_filters(
 
 
 def _cycle_start(model: FusionModel, Q: FloatArray, due: np.ndarray) -> FloatArray:
-    """Return the settled prior covariance at step 0 by doubling the map P -> Q + A P (I + G P)^-1 A' of a whole cycle."""
+    """Return the settled prior covariance at step 0 by doubling the map P -> Q + A P (I + G P)^-1 A' of a cycle."""
     eye = np.eye(len(model.F))
     cycle = None
     for used in due:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from testbed.fusion.base import DEG, CovarianceParameters, Variance
 from testbed.fusion.filters.shakf import AdaptiveFilter
+from testbed.fusion.model_filter import DEG, CovarianceParameters, Variance
 from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ class AllanSrkfParameters(CovarianceParameters):
 class AllanSrkf(AdaptiveFilter):
     r"""Square-root Kalman filter with R from the Allan variance at the shortest correlation time, one sample.
 
-    .. math:: D^- = \mathrm{qr}[F D,\, Q^{1/2}],\; K = P^- H' (H P^- H' + R)^{-1},\; D = \mathrm{qr}[(I - K H) D^-,\, K R^{1/2}],\;
-              R_k = (1 - g_k) R_{k-1} + g_k (z_k - z_{k-1})^2 / 2
+    .. math:: D^- = \mathrm{qr}[F D,\, Q^{1/2}],\; K = P^- H' (H P^- H' + R)^{-1},\;
+              D = \mathrm{qr}[(I - K H) D^-,\, K R^{1/2}],\; R_k = (1 - g_k) R_{k-1} + g_k (z_k - z_{k-1})^2 / 2
 
     with P = D D' and g_k = 1/(k - 1), for all readings of an instant at once; the root of the Joseph form cannot become
     indefinite. The state is sent out before the covariance is updated: in hardware that saves the time of the

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from testbed.fusion.bands import Bands, load_bands
-from testbed.fusion.base import DEG
+from testbed.fusion.base import Rows
 from testbed.fusion.filters.shakf import SageHusa, SageHusaParameters
-from testbed.fusion.kernels import covariance as kernels
+from testbed.fusion.model_filter import DEG
 from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -81,7 +81,8 @@ class ArwShakfLiteralParameters(ArwShakfParameters):
 class ArwShakf(SageHusa):
     r"""Sage-Husa filter whose R is set by bands of the online angle random walk N_k and inflated by S_k.
 
-    .. math:: N_k/dT = (1 - g_k) N_{k-1}/dT + g_k (z_k - z_{k-1})^2 / 2, \quad \tilde R = S R,\; S = \max(1, \alpha \hat C / (H P^- H' + R))
+    .. math:: N_k/dT = (1 - g_k) N_{k-1}/dT + g_k (z_k - z_{k-1})^2 / 2, \quad \tilde R = S R,\;
+        S = \max(1, \alpha \hat C / (H P^- H' + R))
 
     On entering a band R takes the band's value; within it R follows (17). For a sine N_k sees amplitude times
     frequency, so the bands hold for the amplitude that they were calibrated at
@@ -111,11 +112,7 @@ class ArwShakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ArwShakfParameters
-    _diagnostics: ClassVar[dict[str, int]] = SageHusa._diagnostics | {
-        "N": kernels.INCREMENTS,
-        "band": kernels.BAND,
-        "S": kernels.INFLATION,
-    }
+    rows = Rows(SageHusa.rows.once, ("innovation", "innovation_variance", "R", "N", "band", "S"))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ArwShakfParameters

@@ -1,4 +1,4 @@
-"""The complementary filter: a low-pass of the inverted slow sensor and the matching high-pass of the inverted fast one."""
+"""The complementary filter: a low-pass of the inverted slow sensor, the matching high-pass of the inverted fast one."""
 
 from __future__ import annotations
 

@@ -65,9 +65,10 @@ class ReactionWheel(Motion):
     The empirical model of wheels [1]_, torques :math:`T_i = C_i n^2 \sin(h_i \psi + \varphi_i)` with the wheel's angle
     :math:`\psi = \int_0^t n`, acting on a platform of inertia I with modes:
 
-    .. math:: \frac{\dot\theta}{T} = \frac{A(s)}{I s}, \quad A(s) = 1 + \sum_m \frac{g_m s^2}{s^2 + 2 \zeta_m \omega_m s + \omega_m^2},
-        \qquad \dot\theta = \sum_i \frac{C_i n}{I h_i} |A_i| \sin(h_i \psi + \varphi_i + \arg A_i - \pi/2), \quad A_i =
-        A(j h_i n)
+    .. math:: \frac{\dot\theta}{T} = \frac{A(s)}{I s}, \quad
+        A(s) = 1 + \sum_m \frac{g_m s^2}{s^2 + 2 \zeta_m \omega_m s + \omega_m^2}, \qquad
+        \dot\theta = \sum_i \frac{C_i n}{I h_i} |A_i| \sin(h_i \psi + \varphi_i + \arg A_i - \pi/2), \quad
+        A_i = A(j h_i n)
 
     During a ramp each harmonic has the amplitude and phase of its present frequency (quasi-steady): right while it
     stays within half a width of a mode for longer than the mode needs to ring up, h |dn/dt| << (zeta_m omega_m)^2.

@@ -108,7 +108,8 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
     """
     rows, sensors, best = [], presets(), _bounds(rates, protocol)
     yield f"Table II: RMSE in deg/s, phase included; median over {seeds} seed(s)"
-    yield f"{'':8s}{'':20s}{'median':>10s}{'lowest':>10s}{'highest':>10s}{'aligned':>10s}{'paper':>10s}{'x floor':>10s}{'x optimum':>11s}"
+    headings = ("median", "lowest", "highest", "aligned", "paper", "x floor")
+    yield f"{'':28s}{''.join(f'{heading:>10s}' for heading in headings)}{'x optimum':>11s}"
     for signal, rate in rates.items():
         runs = [errors(outputs(rate, seed, sensors), rate, signal, protocol) for seed in range(1, seeds + 1)]
         for name in runs[0]:

@@ -79,8 +79,8 @@ class Split:
 
     belief: the error of the same run without noise, which is what the wrong belief (and the filter's lag) alone forces.
     noise: what the noise adds to that estimate, sample by sample. For a linear filter both are independent, so that
-    :math:`\mathrm{rmse}^2 \approx \mathrm{belief}^2 + \mathrm{noise}^2`; `closure` is the root of that sum over the rmse. A filter that adapts to
-    the noise is another filter without it, and need not close.
+    :math:`\mathrm{rmse}^2 \approx \mathrm{belief}^2 + \mathrm{noise}^2`; `closure` is the root of that sum over
+    the rmse. A filter that adapts to the noise is another filter without it, and need not close.
 
     Parameters
     ----------

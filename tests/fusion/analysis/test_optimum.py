@@ -60,7 +60,7 @@ def test_running_filter_converges_to_the_cycle(order: int) -> None:
 
 @pytest.mark.oracle
 def test_closed_form_is_what_the_fixed_filter_does(reference: Any) -> None:
-    """Monte Carlo: 400 runs of one settled filter on a 200 Hz sine; noise and lag apart, and each sensor's noise apart."""
+    """Monte Carlo: 400 runs of a settled filter on a 200 Hz sine; noise and lag apart, each sensor's noise apart."""
     belief = dict(load_belief("eq39"))
     belief["mems_gyro"] = SensorBelief(
         numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8

@@ -65,7 +65,7 @@ def test_bounds_of_R_hold_and_are_counted(readings: dict[str, FloatArray]) -> No
 
 
 def test_seven_states_at_one_rate_and_at_two() -> None:
-    """The same motion through the believed sensors: followed with both readings at 20 kHz and with the gyro at 2 kHz."""
+    """The same motion through the believed sensors: followed with both at 20 kHz and with the gyro at 2 kHz."""
     from testbed.signals import LinearFilter
 
     fs, n = 20000.0, 40_000

@@ -126,19 +126,39 @@ def test_still_floor_moves_nothing() -> None:
     ("part", "values", "message"),
     [
         (FloorLine, {"axis": "x", "frequency": 1.0}, "expected displacement or acceleration for axis x, got none"),
-        (FloorLine, {"axis": "x", "frequency": 1.0, "angle": 1.0}, ("expected displacement or acceleration for " "axis x, got")),
-        (FloorLine, {"axis": "rz", "frequency": 1.0, "acceleration": 1.0}, "expected angle or angular_acceleration for"),
-        (FloorLine, {"axis": "z", "frequency": 1.0, "acceleration": 1, "displacement": 1}, "got displacement and accel"),
+        (
+            FloorLine,
+            {"axis": "x", "frequency": 1.0, "angle": 1.0},
+            "expected displacement or acceleration for axis x, got",
+        ),
+        (
+            FloorLine,
+            {"axis": "rz", "frequency": 1.0, "acceleration": 1.0},
+            "expected angle or angular_acceleration for",
+        ),
+        (
+            FloorLine,
+            {"axis": "z", "frequency": 1.0, "acceleration": 1, "displacement": 1},
+            "got displacement and accel",
+        ),
         (FloorLine, {"axis": "w", "frequency": 1.0, "displacement": 1.0}, "Input should be 'x', 'y'"),
         (FloorLine, {"axis": "x", "frequency": float("nan"), "displacement": 1.0}, "expected a quantity in Hz"),
         (FloorLine, {"axis": "x", "frequency": 1.0, "displacement": float("inf")}, "expected a quantity in m"),
         (FloorBand, {"axis": "x", "low": 5.0, "high": 5.0, "acceleration_psd": 1.0}, "expected high above low"),
         (FloorBand, {"axis": "x", "low": 5.0, "high": 9.0}, "expected acceleration_psd for axis x, got none"),
-        (FloorBand, {"axis": "rx", "low": 5.0, "high": 9.0, "acceleration_psd": 1.0}, "expected angular_acceleration_psd"),
-        (FloorBand, {"axis": "x", "low": 5.0, "high": 9.0, "acceleration_psd": -1.0}, ("expected at least 0.0 " "m\\^2/s\\^3")),
+        (
+            FloorBand,
+            {"axis": "rx", "low": 5.0, "high": 9.0, "acceleration_psd": 1.0},
+            "expected angular_acceleration_psd",
+        ),
+        (
+            FloorBand,
+            {"axis": "x", "low": 5.0, "high": 9.0, "acceleration_psd": -1.0},
+            "expected at least 0.0 m\\^2/s\\^3",
+        ),
         (Floor, {"ramp_in": -1.0}, "expected at least 0.0 s"),
     ],
-)  # fmt: skip
+)
 def test_parts_refuse_what_is_no_vibration(part: type, values: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         part(**values)

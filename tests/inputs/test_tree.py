@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from testbed.errors import MOST_QUOTED, ScenarioError, UnknownNameError, quoted, shortened
-from testbed.inputs import MOST_BYTES, MOST_CHARACTERS, MOST_DEPTH, MOST_DIGITS, MOST_NODES, read_bytes, read_yaml
+from testbed.inputs.files import read_bytes
+from testbed.inputs.tree import MOST_BYTES, MOST_CHARACTERS, MOST_DEPTH, MOST_DIGITS, MOST_NODES, read_yaml
 
 # What `check` may take for anything [s]; a refusal here takes a tenth of it.
 _PATIENCE = 5.0
@@ -89,20 +90,43 @@ def bomb(levels, width):
 
 
 HOSTILE = {
-    **{f"{kind} {n} deep": text for n in (MOST_DEPTH + 1, 100, 3000) for kind, text in (
-        ("lists", "a: " + "[" * n + "]" * n),
-        ("mappings", "a: " + "{a: " * n + "}" * n),
-        ("open", "[" * n),
-        ("dashes", "- " * n),
-        ("questions", "? " * n),
-    )},
+    **{
+        f"{kind} {n} deep": text
+        for n in (MOST_DEPTH + 1, 100, 3000)
+        for kind, text in (
+            ("lists", "a: " + "[" * n + "]" * n),
+            ("mappings", "a: " + "{a: " * n + "}" * n),
+            ("open", "[" * n),
+            ("dashes", "- " * n),
+            ("questions", "? " * n),
+        )
+    },
     "indents": "\n".join(" " * i + "a:" for i in range(700)),
     **{f"bomb {levels} x {width}": bomb(levels, width) for levels, width in ((6, 9), (20, 9), (20, 2), (3, 200))},
-    "merge bomb": "\n".join(["a0: &a0 {x: 1}", *(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 12))]),
+    "merge bomb": "\n".join(
+        ["a0: &a0 {x: 1}", *(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 12))]
+    ),
     **{f"itself {i}": text for i, text in enumerate(("a: &a [*a]", "a: &a {b: *a}", "&a {b: {c: [*a]}}"))},
-    **{f"tag {tag}": f"a: {tag} x" for tag in ("!!set", "!!python/object:os.system", "!own", "!!binary", "!", "!!str", "!!omap", "!<x>", "!<" + "y" * 100_000 + ">")},
+    **{
+        f"tag {tag}": f"a: {tag} x"
+        for tag in (
+            "!!set",
+            "!!python/object:os.system",
+            "!own",
+            "!!binary",
+            "!",
+            "!!str",
+            "!!omap",
+            "!<x>",
+            "!<" + "y" * 100_000 + ">",
+        )
+    },
     "set": "a: !!set {x, y}",
-    **{f"digits {sign}{n}": f"a: {sign}{'1' * n}" for n in (MOST_DIGITS + 1, 400, 4000) for sign in ("", "-", "+", ".", "1.", "0x", "1e", "1_")},
+    **{
+        f"digits {sign}{n}": f"a: {sign}{'1' * n}"
+        for n in (MOST_DIGITS + 1, 400, 4000)
+        for sign in ("", "-", "+", ".", "1.", "0x", "1e", "1_")
+    },
     "long text": "a: " + "x" * (MOST_CHARACTERS + 1),
     "long key": "x" * (MOST_CHARACTERS + 1) + ": 1",
     "many items": "a: [" + "1, " * MOST_NODES + "]",
@@ -115,7 +139,7 @@ HOSTILE = {
     "yaml 1.9": "%YAML 1.9\n---\na: 1\n",
     "list key": "[1, 2]: 3",
     "mapping key": "{a: 1}: 3",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", HOSTILE)
@@ -165,9 +189,18 @@ class Mute:
 
 @pytest.mark.parametrize(
     "value",
-    ["x" * 100_000, 10**5000, [1] * 100_000, deep(900), dict.fromkeys(range(1000), "y" * 1000), b"z" * 1000, Mute(), -(2**2000)],
+    [
+        "x" * 100_000,
+        10**5000,
+        [1] * 100_000,
+        deep(900),
+        dict.fromkeys(range(1000), "y" * 1000),
+        b"z" * 1000,
+        Mute(),
+        -(2**2000),
+    ],
     ids=["text", "number", "list", "deep", "mapping", "bytes", "mute", "negative"],
-)  # fmt: skip
+)
 def test_quoted_shows_at_most_80_characters(value):
     assert 0 < len(quoted(value)) <= MOST_QUOTED
     assert len(shortened(str(value)[:200] if not isinstance(value, int | Mute) else "")) <= MOST_QUOTED

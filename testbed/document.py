@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from testbed.errors import Problem, ScenarioError, quoted, shortened
-from testbed.inputs import read_yaml
+from testbed.inputs.tree import read_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -28,6 +28,8 @@ class Document:
     ----------
     path : Path
         The file.
+    what : str
+        What it should hold, with its first keys, for the message about an empty or wrong one.
 
     Raises
     ------
@@ -36,10 +38,10 @@ class Document:
         `testbed.inputs`.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.file = str(path)
+    def __init__(self, path: Path, what: str = "scenario (name, duration, motion, sensors, ...)") -> None:
+        self.file, self._what = str(path), what
         self.problems: list[Problem] = []
-        self._tree = read_yaml(path, "a scenario")
+        self._tree = read_yaml(path, f"a {what.split(maxsplit=1)[0]}")
         self.data = self._mapping(self._tree.data)
 
     def find(self, key: Key, message: str) -> None:
@@ -73,9 +75,9 @@ class Document:
 
     def _mapping(self, data: Any) -> Any:
         if data is None:
-            self._fatal("is empty; expected a scenario (name, duration, motion, sensors, ...)")
+            self._fatal(f"is empty; expected a {self._what}")
         if not isinstance(data, dict):
-            self._fatal("expected a mapping (name: ..., duration: ..., motion: ...)", line=1)
+            self._fatal(f"expected a mapping, the keys of a {self._what}", line=1)
         return data
 
     def _fatal(self, message: str, *, line: int | None = None) -> NoReturn:
