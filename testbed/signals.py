@@ -95,7 +95,8 @@ class LinearFilter:
         .. math:: x_0 = \bar x + \xi + s (u_0 - \bar u), \quad \mathrm{cov}\, \xi = \Phi\, \mathrm{cov}\, \xi\, \Phi'
             + \sigma^2 b b', \quad b = \Phi s + \Gamma - s
 
-        with :math:`\bar x` the equilibrium at `level`, s what the last sample's ramp adds; before the first sample only.
+        with :math:`\bar x` the equilibrium at `level` and s what the last sample's ramp adds; before the first sample
+        only.
 
         Parameters
         ----------

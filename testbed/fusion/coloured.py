@@ -59,6 +59,9 @@ class MarkovFit:
         return value
 
 
+_NOTHING = MarkovFit(np.zeros(0), np.zeros(0), np.zeros(0))
+
+
 def fit_markov(
     slow: Callable[[FloatArray], FloatArray], white: float, lowest_hz: float, *, per_decade: float = 1.0
 ) -> MarkovFit:
@@ -93,7 +96,7 @@ def fit_markov(
     from scipy.optimize import nnls
 
     if not np.any(slow(np.array([lowest_hz])) > 0.0):
-        return MarkovFit(*(np.zeros(0) for _ in range(3)))
+        return _NOTHING
     if not white > 0.0:
         msg = f"white noise: expected more than 0 beside 1/f noise, got {white:g} rad^2/s; the fit would have no end"
         raise ValueError(msg)
@@ -101,7 +104,7 @@ def fit_markov(
     band = np.logspace(math.log10(lowest_hz), math.log10(_HIGHEST_HZ), max(round(_PER_DECADE * decades), 2))
     above = band[slow(band) > _LEAST_SHARE * white]
     if not above.size:
-        return MarkovFit(*(np.zeros(0) for _ in range(3)))
+        return _NOTHING
     last = max(_LAST * above[-1], lowest_hz)
     corners = np.geomspace(lowest_hz, last, math.ceil(math.log10(last / lowest_hz) * per_decade) + 1)
     low, high = 0.5 * lowest_hz, 5.0 * above[-1]

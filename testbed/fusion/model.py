@@ -29,9 +29,9 @@ from testbed.fusion.start import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from testbed.fusion.belief import SensorBelief
     from numpy.typing import NDArray
 
+    from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
 # Derivatives of the rate are kept per 10 ms, so that they are of the rate's own size in the band of interest.
@@ -156,7 +156,7 @@ def _with_slow_noise(
     for i, (inner, outer) in enumerate((one.inner, one.outer) for one in noises):
         # Noise before the dynamics enters where the rate does.
         mine = np.flatnonzero(owners == i)
-        A[np.ix_(mine, range(at, at + inner.rate.size))] = A[mine, :1]
+        A[mine, at : at + inner.rate.size] = A[mine, :1]
         H[i, at : at + inner.rate.size] = H[i, 0]
         at += inner.rate.size
         H[i, at : at + outer.rate.size] = 1.0

@@ -11,7 +11,6 @@ from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer,
 from testbed.fusion.base import BlockFilter, CommonParameters
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
-from testbed.parts import Part
 from testbed.units import Quantity
 
 if TYPE_CHECKING:
@@ -143,8 +142,13 @@ class ModelFilter(BlockFilter):
         form = parameters.form if isinstance(parameters, FormParameters) else "joseph"
         precision = parameters.precision if isinstance(parameters, CovarianceParameters) else "double"
         self.model: FusionModel = build_model(
-            belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise,
-            coloured=parameters.coloured, start=parameters.start,
+            belief,
+            sample_rate_hz,
+            order=parameters.order,
+            q=parameters.q,
+            use_input_noise=parameters.use_input_noise,
+            coloured=parameters.coloured,
+            start=parameters.start,
         )
         self._form = FORMS[form]
         kind = np.float32 if precision == "single" else np.float64

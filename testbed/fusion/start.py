@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 StartKind = Literal["unknown", "rest"]
 
-# Without a range: a table's constant rate, and a tenth of it for what alternates.
+# More is neither needed, since readings soon outweigh it (`benchmarks/bench_starts.py` starts inside 200 deg/s), nor
+# harmless: with 289 deg/s, an even spread over 500 deg/s, P loses a factor of 200 more of its digits.
 _CONSTANT_STD = math.radians(20.0)
 _ALTERNATING_SHARE = 0.1
 _ALTERNATING_HZ = 0.5
@@ -48,8 +49,8 @@ class Spread:
 
 
 def unknown_spread(believed: Sequence[SensorBelief]) -> Spread:
-    """Return the spread of an unknown start: an even one over the widest range of the sensors that see a constant rate,
-    20 deg/s where none names a range; a tenth of it alternates.
+    """Return the spread of an unknown start: constant 20 deg/s, or that of an even one over the widest range of the
+    sensors that see a constant rate if it is less; a tenth of it alternates.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def unknown_spread(believed: Sequence[SensorBelief]) -> Spread:
         The sensors.
     """
     ranges = [one.range for one in believed if one.range is not None and one.sees_constant]
-    constant = max(ranges) / math.sqrt(3.0) if ranges else _CONSTANT_STD
+    constant = min(_CONSTANT_STD, max(ranges) / math.sqrt(3.0)) if ranges else _CONSTANT_STD
     return Spread(constant, _ALTERNATING_SHARE * constant)
 
 
@@ -110,5 +111,4 @@ def constant_response(A: FloatArray, drive: FloatArray) -> FloatArray:
 def alternating_response(A: FloatArray, drive: FloatArray) -> ComplexArray:
     """Return the states for a unit sine of 0.5 Hz [-], complex, shape (n_state,); arguments as `constant_response`."""
     turn = 2j * np.pi * _ALTERNATING_HZ
-    response: ComplexArray = np.linalg.solve(turn * np.eye(len(A)) - A, drive.astype(complex))
-    return response
+    return np.asarray(np.linalg.solve(turn * np.eye(len(A)) - A, drive.astype(complex)), complex)

@@ -74,7 +74,7 @@ class _Reader:
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = self._fusion(parts["fusion"], types)
+        fusion = self._fusion(parts["fusion"], types, turntable)
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
@@ -160,18 +160,25 @@ class _Reader:
                 sensors[name] = sensor
         return sensors, types
 
-    def _fusion(self, data: Any, types: Mapping[str, str]) -> dict[str, FilterSpec]:
+    def _fusion(
+        self, data: Any, types: Mapping[str, str], turntable: TurntableParameters | None
+    ) -> dict[str, FilterSpec]:
         specs = {}
         for name, entry in self._mapping(data, ("fusion",)).items():
             key = ("fusion", name)
             if self._good_name(name, key):
-                spec = self._filter(name, dict(self._mapping(entry, key)), types, key)
+                spec = self._filter(name, dict(self._mapping(entry, key)), types, turntable, key)
                 if spec is not None:
                     specs[name] = spec
         return specs
 
     def _filter(
-        self, name: str, entry: dict[str, Any], types: Mapping[str, str], key: tuple[str | int, ...]
+        self,
+        name: str,
+        entry: dict[str, Any],
+        types: Mapping[str, str],
+        turntable: TurntableParameters | None,
+        key: tuple[str | int, ...],
     ) -> FilterSpec | None:
         kind = self._type(entry.pop("type", name), key)
         believed = entry.pop("belief", "eq39")
@@ -184,6 +191,7 @@ class _Reader:
             self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
             return None
         model = getattr(factory, "Parameters", None)
+        entry = {**_at_rest(model, entry, turntable), **entry}
         parameters = entry if model is None else self._doc.validate(model, entry, key, self._folder)
         if parameters is None or belief is None:
             return None
@@ -250,6 +258,16 @@ class _Reader:
             return True
         self._doc.find(key, f"expected a name of letters, digits and underscores, got {quoted(name)}")
         return False
+
+
+def _at_rest(model: Any, entry: Mapping[str, Any], turntable: TurntableParameters | None) -> dict[str, str]:
+    """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at the
+    Earth's rate where that is on.
+    """
+    if "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
+        return {}
+    earth = None if turntable is None else turntable.earth_rate
+    return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
 
 
 def at_temperature(sensor: Sensor, temperature: float) -> Sensor:

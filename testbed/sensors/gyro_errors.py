@@ -157,7 +157,7 @@ class GyroErrors(Part):
 
 
 class Fir:
-    """Weighted sum of the newest samples, the first one for ever before it; any division into blocks gives the same bits.
+    """Weighted sum of the newest samples, the first one for ever before it; the same bits for any division into blocks.
 
     Parameters
     ----------

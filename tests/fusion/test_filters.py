@@ -115,7 +115,8 @@ def test_one_sensor_alone_and_all_missing_are_fine(name: str) -> None:
     lost = _stage(name).process({"mems_gyro": np.full(10, np.nan), "mhd_ars": np.full(100, np.nan)})
     assert np.array_equal(lost.rate, np.zeros(100))
     # Where a settled error is added it is a thousandth of that, and adds in squares.
-    np.testing.assert_allclose(lost.std, np.radians(1.0), rtol=1e-6 if name in TWO_PATHS else 1e-12)
+    wanted = np.radians(1.0) if name in TWO_PATHS else np.radians(np.hypot(20.0, 2.0))
+    np.testing.assert_allclose(lost.std, wanted, rtol=1e-6 if name in TWO_PATHS else 1e-12)
 
 
 def test_innovations_are_given_where_readings_are(name: str, readings: dict[str, FloatArray]) -> None:

@@ -100,7 +100,7 @@ class Wideband(ModelFilter):
         self._R = self.measurement_noise("R", {}, explicit=False)
         self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
         self._levels = np.log10(q)
-        self._x = np.zeros((self._x.size, q.size))
+        self._x = np.repeat(self._x[:, None], q.size, axis=1)
         self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
         self._score = np.zeros(q.size)
         self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
@@ -119,8 +119,17 @@ class Wideband(ModelFilter):
         q: FloatArray,
     ) -> FloatArray:
         """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
-        order, use = parameters.order, parameters.use_input_noise
-        models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
+        models = [
+            build_model(
+                belief,
+                sample_rate_hz,
+                order=parameters.order,
+                q=float(one),
+                use_input_noise=parameters.use_input_noise,
+                coloured=parameters.coloured,
+            )
+            for one in q
+        ]
         return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:

@@ -445,7 +445,7 @@ def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
 
 
 @functools.lru_cache
-def settling_kernel(n: int, n_sensor: int) -> Any:
+def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, R, Z, cycle, progress, out), the Kalman filter until its gains have settled, then with
     those.
 

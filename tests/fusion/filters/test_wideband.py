@@ -38,7 +38,7 @@ def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tupl
     n_time = readings["mhd_ars"].size
     x_all, P_all, loglik, e_all, C_all = np.empty((5, q.size, n_time))
     for m, one in enumerate(q):
-        model = build_model(BELIEF, RATES, order=p.order, q=float(one))
+        model = build_model(BELIEF, RATES, order=p.order, q=float(one), start="rest")
         x, P = np.zeros(len(model.F)), model.P0.copy()
         for k in range(n_time):
             if k:
@@ -74,7 +74,7 @@ def test_bank_equals_its_equations(reference: Any, order: int) -> None:
     readings = reference.readings(reference.sines((40.0, 1.0), duration=0.01), 3)
     q = {1: 1e-2 * DEG**2, 3: 1e4 * DEG**2}[order]
     p = WidebandParameters(
-        order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3, restart=np.inf
+        order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3, restart=np.inf, start="rest"
     )
     ours = run(readings, **p.model_dump())
     rate, std, innovation, variance = literal_bank(readings, p)
@@ -108,7 +108,7 @@ def test_the_weights_follow_the_signal(reference: Any) -> None:
 def test_a_jump_of_frequency_is_followed(reference: Any) -> None:
     slow, fast = reference.sines((0.5, 1.0), duration=3.0), reference.sines((100.0, 1.0), duration=3.0)
     rate = np.concatenate([slow, fast])
-    error = run(reference.readings(rate, 5)).rate - rate
+    error = run(reference.readings(rate, 5), start="rest").rate - rate
     # From 0.1 s (two memories) after the jump on, what 100 Hz costs a fixed filter and the start-up of the slow mode,
     # with margin.
     assert np.sqrt(np.mean(error[62_000:] ** 2)) / DEG < 0.006
@@ -118,7 +118,7 @@ def test_a_jump_of_frequency_is_followed(reference: Any) -> None:
 def test_an_amplitude_change_of_100_times_is_followed(reference: Any) -> None:
     small, large = reference.sines((10.0, 0.1), duration=2.0), reference.sines((10.0, 10.0), duration=2.0)
     for rate in (np.concatenate([small, large]), np.concatenate([large, small])):
-        block = run(reference.readings(rate, 6))
+        block = run(reference.readings(rate, 6), start="rest")
         error = np.abs(block.rate - rate) / DEG
         assert np.isfinite(block.rate).all()
         assert rmse(block.rate, rate, 1.8) < 0.01
@@ -158,7 +158,7 @@ def spoilt(readings: dict[str, FloatArray], fault: str) -> dict[str, FloatArray]
 def test_a_fault_passes_and_leaves_nothing_behind(reference: Any, fault: str) -> None:
     rate = reference.sines((4.0, 1.0), duration=1.7)
     readings = reference.readings(rate, 7)
-    clean, block = run(readings), run(spoilt(readings, fault))
+    clean, block = run(readings, start="rest"), run(spoilt(readings, fault), start="rest")
     assert np.isfinite(block.rate).all()
     assert np.isfinite(block.std).all()
     # The slow mode of the pair of sensors keeps a trace for half a minute: it may add 0.02 deg/s, a fiftieth of the

@@ -1,4 +1,4 @@
-"""Records of the two sensors for the benchmarks and tests of the filters: motion as a formula, instruments as shipped."""
+"""Records of the two sensors for tests and benchmarks of the filters: motion as a formula, instruments as shipped."""
 
 from __future__ import annotations
 
