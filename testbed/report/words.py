@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from testbed.report.digest import Digest
-    from testbed.report.folder import RunMetrics, SourceMetrics
+    from testbed.runs.metrics import RunMetrics, SourceMetrics
 
 METRICS = {
     "rmse_deg_s": "RMSE",
