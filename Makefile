@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline clean
+.PHONY: run view test lint bench baseline changes clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -42,6 +42,10 @@ bench: .venv/installed-test
 # Rewrites the stored error-against-frequency curves; say in the commit why they moved.
 baseline: .venv/installed-test
 	$(BIN)/python -m tests.regression.error_vs_frequency
+
+# What the next release says, from the files in changes/; without --draft it goes into CHANGELOG.md and they go away.
+changes: .venv/installed-test
+	$(BIN)/towncrier build --draft --version "$$($(BIN)/python -c 'import testbed; print(testbed.__version__)')"
 
 clean:
 	rm -rf .venv runs
