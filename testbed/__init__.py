@@ -19,8 +19,7 @@ from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from testbed.chain.runner import run
-    from testbed.runs.folder import open_run
-    from testbed.runs.results import Run
+    from testbed.notebook import Run, open_run
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
 
@@ -38,10 +37,10 @@ __all__ = [
 ]
 
 _LAZY = {
-    "Run": "testbed.runs.results",
+    "Run": "testbed.notebook",
     "Scenario": "testbed.scenario.model",
     "load_scenario": "testbed.scenario.loader",
-    "open_run": "testbed.runs.folder",
+    "open_run": "testbed.notebook",
     "run": "testbed.chain.runner",
 }
 

@@ -59,7 +59,7 @@ def run(
         from testbed.recording.viewer import open_viewer
 
         open_viewer(target)
-    if not all(row["met"] for row in result.metrics["expectations"]):
+    if not all(bound.met for bound in result.metrics.expectations):
         raise typer.Exit(MISSED)
 
 

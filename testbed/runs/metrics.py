@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
@@ -40,13 +40,15 @@ class Entry(BaseModel, Mapping[str, Any]):
     def __eq__(self, other: object) -> bool:
         return Mapping.__eq__(self, other)
 
+    __hash__: ClassVar[None] = None  # type: ignore[assignment] # as of every mapping
+
     def to_dict(self) -> dict[str, Any]:
         """Return the plain mapping that metrics.json holds."""
         return self.model_dump(exclude_unset=True)
 
 
 class LineMetrics(Entry):
-    """What became of one commanded line [Hz]: gain [-] and phase [deg] of the estimate over the truth, errors [deg/s]."""
+    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, errors [deg/s]."""
 
     frequency_hz: float
     gain: float | None = None

@@ -87,18 +87,18 @@ def _is_signal(item: Any) -> bool:
 
 def _sample_rate(path: Path, key: str, node: Any) -> float:
     """Return the rate that the group states, held against its time; of a file that states none, that of its time."""
-    time = node["time"]
-    n, stated = int(time.shape[0]), node.attrs.get("sample_rate_hz")
-    first, last = (float(time[0]), float(time[-1])) if n else (0.0, 0.0)
-    if first != 0.0 or (n > 1 and not last > 0.0):
-        raise _bad(path, key, f"expected time from 0 s on, increasing, got {first} s to {last} s")
+    time, stated = node["time"], node.attrs.get("sample_rate_hz")
+    n = int(time.shape[0])
     if n < 2:
         raise _bad(path, key, f"expected at least 2 samples, got {n}")
-    rate = (n - 1) / last
+    first, last = float(time[0]), float(time[-1])
+    if first != 0.0 or not last > 0.0:
+        raise _bad(path, key, f"expected time from 0 s on, increasing, got {first} s to {last} s")
+    rate = (n - 1) / last if stated is None else float(np.ravel(stated)[0])
     # A drift of half a sample over the run is no rounding.
-    if stated is not None and abs(float(stated) * last - (n - 1)) > 0.5:
-        raise _bad(path, key, f"expected samples at the stated {float(np.asarray(stated)):g} Hz, got {rate:g} Hz")
-    return rate if stated is None else float(stated)
+    if abs(rate * last - (n - 1)) > 0.5:
+        raise _bad(path, key, f"expected samples at the stated {rate:g} Hz, got {(n - 1) / last:g} Hz")
+    return rate
 
 
 def _text(attribute: Any) -> str:

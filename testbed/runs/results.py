@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
+from testbed.runs.attributes import unit_of
 from testbed.runs.block import columns
 from testbed.runs.folder import ESSENTIAL
 from testbed.runs.metrics import RunMetrics, read_metrics
-from testbed.runs.attributes import unit_of
 from testbed.runs.reading import read_groups
 from testbed.runs.signals import Signals, kept
 
@@ -44,7 +44,9 @@ class RunRecord:
         """Return the run made of `groups` named as in run.nc."""
 
         def below(prefix: str) -> dict[str, Signals]:
-            return {group.removeprefix(prefix): signals for group, signals in groups.items() if group.startswith(prefix)}
+            return {
+                group.removeprefix(prefix): signals for group, signals in groups.items() if group.startswith(prefix)
+            }
 
         return cls(groups["commanded"], groups["truth"], below("sensors/"), below("fusion/"), metrics, folder)
 
