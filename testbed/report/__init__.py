@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import Problem, ScenarioError
 from testbed.pages.palette import series_colors
 from testbed.pages.template import render
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
-from testbed.runs.folder import write_text
+from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
 
@@ -28,7 +27,7 @@ def write_report(run_dir: Path) -> Path:
     """Write ``report.html`` from ``run.nc``, ``metrics.json`` and ``scenario.yaml`` of a finished run folder.
 
     Signals are read in blocks, so that memory does not grow with the duration. The page is written beside and renamed:
-    an earlier one stays whole until the new one is.
+    an earlier one stays whole until the new one is. The folder's manifest follows it.
 
     Parameters
     ----------
@@ -46,12 +45,9 @@ def write_report(run_dir: Path) -> Path:
         If the folder lacks a file, or a file is damaged; names it and what was expected.
     """
     run_dir = Path(run_dir)
-    if not run_dir.is_dir():
-        message = "expected a run folder (run.nc, metrics.json, scenario.yaml), got none"
-        raise ScenarioError([Problem(message, file=str(run_dir))])
     run = RunRecord.open(run_dir)
     scenario = read_text(run_dir / "scenario.yaml", "the resolved scenario (YAML text)")
-    write_text(run_dir / REPORT, _render(run.metrics, scenario, digest_run(run)))
+    rewrite(run_dir, REPORT, _render(run.metrics, scenario, digest_run(run)))
     return run_dir / REPORT
 
 

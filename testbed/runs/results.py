@@ -12,6 +12,7 @@ from testbed.errors import Problem, ScenarioError
 from testbed.runs.attributes import unit_of
 from testbed.runs.block import columns
 from testbed.runs.folder import ESSENTIAL
+from testbed.runs.leftovers import heal
 from testbed.runs.metrics import RunMetrics, read_metrics
 from testbed.runs.reading import read_groups
 from testbed.runs.signals import Signals, kept
@@ -65,6 +66,7 @@ class RunRecord:
             If it is no run folder, or a file in it is damaged.
         """
         path = Path(folder).absolute()
+        heal(path)
         missing = [name for name in ESSENTIAL if not (path / name).is_file()]
         if missing:
             problem = f"expected a run folder, but {', '.join(str(Path(folder) / name) for name in missing)} is missing"
