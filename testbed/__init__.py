@@ -15,10 +15,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from testbed._version import __version__
-from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from testbed.chain.runner import run
+    from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.notebook import Run, open_run
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
@@ -37,8 +37,12 @@ __all__ = [
 ]
 
 _LAZY = {
+    "Problem": "testbed.errors",
     "Run": "testbed.notebook",
+    "RunError": "testbed.errors",
     "Scenario": "testbed.scenario.model",
+    "ScenarioError": "testbed.errors",
+    "UnknownNameError": "testbed.errors",
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
     "run": "testbed.chain.runner",
