@@ -10,12 +10,13 @@ One grammar for every command, ``testbed COMMAND ARGUMENT [--option VALUE]``:
   names it as ``written``.
 - A quantity is a number in SI or carries its unit: ``--block 2``, ``--block "20 ms"``. An option that may be given
   several times is repeated. What names a column, a unit or a time of a text file is called the same everywhere.
-- Exit status: 0 done, 1 an expectation was missed or a leak found, 2 bad input, 3 the run failed, 130 interrupted.
+- Exit status: 0 done, 1 an expectation was missed or a leak found, 2 bad input, 3 the run failed, 4 a fault of ours,
+  130 interrupted.
 
 A command is a function in `testbed.cli.commands` and a line in `testbed.cli.app`: its docstring is the summary, one
 finished sentence; `expanded` gives it the shared options; heavy libraries are imported inside.
 """
 
-from testbed.cli.app import main
+from testbed.cli.entry import main
 
 __all__ = ["main"]

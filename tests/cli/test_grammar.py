@@ -18,7 +18,7 @@ import typer
 from typer.testing import CliRunner
 
 import testbed
-from testbed.cli.app import main
+from testbed.cli import main
 from testbed.cli.catalogue import catalogue
 from testbed.cli.options import Output, expanded
 from tests.cli.commands import COMMANDS, arguments, options
