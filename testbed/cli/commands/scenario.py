@@ -34,13 +34,13 @@ def run(
     target = out or Path("runs") / loaded.name
     with output.progress(loaded.name, loaded.frame.duration) as tick:
         result = run_scenario(loaded, out=target, seed=seed, block=length, progress=tick)
-    document = json.loads((target / "metrics.json").read_text(encoding="utf-8"))
-    output.show({**document, "written": str(target)}, lambda: print_metrics(result.metrics, target))
+    document = {**result.metrics.to_dict(), "written": str(target)}
+    output.show(document, lambda: print_metrics(result.metrics, target))
     if view:
         from testbed.recording.viewer import open_viewer
 
         open_viewer(target)
-    if not all(row["met"] for row in document["expectations"]):
+    if not all(bound.met for bound in result.metrics.expectations):
         raise typer.Exit(MISSED)
 
 
