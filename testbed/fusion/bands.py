@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import model_validator
 
 from testbed.errors import UnknownNameError
-from testbed.fusion.base import Variance
+from testbed.fusion.model_filter import Variance
 from testbed.parts import Part
 from testbed.units import Duration
 

@@ -1,37 +1,26 @@
-"""What every filter shares: its parameters, the schedule of several sample rates, and the block it returns."""
+"""What every filter shares: schedule, gaps and blocks. A method adds its `Parameters`, its state and `_advance`."""
 
 from __future__ import annotations
 
-import math
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, LARGEST_RATE, SQUARE_ROOT
-from testbed.fusion.model import FusionModel, build_model, covariance_root
-from testbed.parts import Part
-from testbed.units import Quantity
+from testbed.fusion.belief import check_belief
+from testbed.fusion.kernels.covariance import HEADER_ROWS, RATE, STD
+from testbed.fusion.schedule import Schedule
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike
-    from pydantic.config import JsonDict
 
     from testbed.fusion.belief import SensorBelief
+    from testbed.parts import Part
     from testbed.signals import FloatArray
 
-DEG = math.pi / 180.0
-
-Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
-
-FORMS = {"conventional": CONVENTIONAL, "joseph": JOSEPH, "square_root": SQUARE_ROOT}
-
-_Q_SCHEMA = cast(
-    "JsonDict", {"type": "string", "description": "(deg/s)^2/s^(2 order - 1)", "examples": ["0.3 (deg/s)^2/s"]}
-)
 _UNITS = {
     "innovation": "rad/s",
     "innovation_variance": "rad^2/s^2",
@@ -68,77 +57,30 @@ class EstimateBlock:
     diagnostics: dict[str, FloatArray]
 
 
-def signal_noise_unit(order: int) -> str:
-    """Return the SI unit of q for a signal model of that order: (rad/s)^2/s for 1, and s^-2 more for each further
-    order.
-    """
-    return f"rad^2/s^{2 * order + 1}"
-
-
-class FilterParameters(Part):
-    """Parameters of the signal model, common to the filters.
+class Rows(NamedTuple):
+    """Names of the rows of a filter's output in their order, behind rate and std; None is not shown.
 
     Parameters
     ----------
-    order : int
-        Number m of integrators between the white noise and the rate, 1 to 3.
-    q : float
-        Its density [rad^2/s^(2m+1)], such as "0.3 (deg/s)^2/s" for order 1 or "1e6 (deg/s)^2/s^3" for order 2; None
-        takes the filter's own.
-    use_input_noise : bool
-        Count the input noise of the belief as process noise.
+    once : tuple of str
+        Rows that stand there once.
+    per_sensor : tuple of str
+        Rows that each sensor has, one sensor after the other; shown as ``<name>_<sensor>``.
     """
 
-    default_q: ClassVar[dict[int, float]] = {}
+    once: tuple[str | None, ...] = ()
+    per_sensor: tuple[str | None, ...] = ()
 
-    order: Annotated[int, Field(ge=1, le=3)] = 1
-    q: Annotated[float, Field(validate_default=True, json_schema_extra=_Q_SCHEMA)] = cast("float", None)
-    use_input_noise: bool = True
-
-    @field_validator("q", mode="before")
-    @classmethod
-    def _read_q(cls, value: Any, info: ValidationInfo) -> float:
-        order = info.data.get("order", 1)
-        if value is None:
-            if order not in cls.default_q:
-                msg = f"expected a value in {signal_noise_unit(order)}: there is no default for order {order}"
-                raise ValueError(msg)
-            return cls.default_q[order]
-        example = "0.3 (deg/s)^2/s" if order == 1 else f"1e6 (deg/s)^2/s^{2 * order - 1}"
-        return Quantity(signal_noise_unit(order), example, at_least=0.0).validate(value, info)
-
-    @field_serializer("q")
-    def _write_q(self, value: float, info: SerializationInfo) -> str | float:
-        return f"{value!r} {signal_noise_unit(self.order)}" if (info.context or {}).get("border") else value
-
-
-class FormParameters(FilterParameters):
-    """Parameters of a filter whose covariance recursion can be chosen.
-
-    Parameters
-    ----------
-    form : {"joseph", "conventional", "square_root"}
-        What the covariance recursion carries: P by the Joseph form; P by P - K H P, which rounding can make indefinite,
-        to show it; or a root D of P = D D' by QR decompositions.
-    """
-
-    form: Literal["joseph", "conventional", "square_root"] = "joseph"
-
-
-class CovarianceParameters(FormParameters):
-    """Parameters of a filter whose covariance recursion and its arithmetic can be chosen.
-
-    Parameters
-    ----------
-    precision : {"double", "single"}
-        Arithmetic of the state and covariance recursion.
-    """
-
-    precision: Literal["double", "single"] = "double"
+    def names(self, sensors: tuple[str, ...]) -> list[str | None]:
+        """Return the name of each row for these sensors."""
+        return [*self.once, *(name and f"{name}_{sensor}" for sensor in sensors for name in self.per_sensor)]
 
 
 class BlockFilter:
-    """Common part of the filters: builds the model, checks the blocks and spreads their readings over the fastest rate.
+    """Base of every filter: checks the blocks, spreads their readings over the fastest rate, names what comes out.
+
+    A method gives three things: its `Parameters`; its state, in `__init__`; and `_advance`, which fills the rows of a
+    block. What it shows beside rate and std it names in `rows`.
 
     Parameters
     ----------
@@ -146,114 +88,59 @@ class BlockFilter:
         What is believed about each sensor.
     sample_rate_hz : mapping of str to float
         Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
-    parameters : FilterParameters
-        Parameters of the filter.
+    parameters : Part
+        The method's `Parameters`.
 
     Raises
     ------
     ValueError
-        If a sensor has no belief, a rate does not divide the fastest one, or a parameter names an unknown sensor.
+        If a sensor has no belief, or a rate does not divide the fastest one.
     """
 
+    Parameters: ClassVar[type[Part]]
+    rows: Rows = Rows()
+
     def __init__(
-        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: FilterParameters
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: Part
     ) -> None:
-        form = parameters.form if isinstance(parameters, FormParameters) else "joseph"
-        precision = parameters.precision if isinstance(parameters, CovarianceParameters) else "double"
-        self.model: FusionModel = build_model(
-            belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
-        )
-        self._sample = 0
-        self._form = FORMS[form]
-        kind = np.float32 if precision == "single" else np.float64
-        self._x = np.zeros(self.model.F.shape[0], kind)
-        self._F, self._H = self.model.F.astype(kind), self.model.H.astype(kind)
-        self._P, self._Q = self.carried(self.model.P0), self.carried(self.model.Q)
+        check_belief(belief, sample_rate_hz)
+        self.schedule = Schedule(sample_rate_hz)
 
-    def carried(self, covariance: FloatArray) -> FloatArray:
-        """Return what the recursion carries for a covariance, in its precision: a copy, or its root."""
-        value = covariance_root(covariance) if self._form == SQUARE_ROOT else covariance
-        return value.astype(self._x.dtype)
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Covariance of the state after the last step, shape (n_state, n_state) [state^2]."""
-        P = self._P.astype(float)
-        return P @ P.T if self._form == SQUARE_ROOT else P
-
-    def measurement_noise(self, key: str, chosen: Mapping[str, float], *, explicit: bool) -> FloatArray:
-        """Return R [rad^2/s^2] per sensor: the chosen one, or else the belief's.
+    @abstractmethod
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+        """Filter a block of any length, from the state that the last one left.
 
         Parameters
         ----------
-        key : str
-            Name of the parameter that `chosen` comes from, for the message.
-        chosen : mapping of str to float
-            R of some sensors [rad^2/s^2].
-        explicit : bool
-            The user named these sensors, so an unknown one is an error.
-
-        Returns
-        -------
-        ndarray, shape (n_sensor,)
-            R [rad^2/s^2].
-
-        Raises
-        ------
-        ValueError
-            If a chosen sensor is unknown or an R is not positive.
+        Z : ndarray, shape (n_sensor, n_time)
+            Readings at the fastest rate [rad/s], read-only: NaN where none is due, infinite where one is missing.
+        out : ndarray, shape (n_row, n_time)
+            To be filled: rate, std [rad/s], then `rows`; NaN where undefined, as it comes.
         """
-        self.check_sensors(key, chosen, explicit=explicit)
-        R = np.array([chosen.get(name, self.model.R[i]) for i, name in enumerate(self.model.sensors)])
-        for name, value in zip(self.model.sensors, R, strict=True):
-            if not value > 0.0:
-                msg = (
-                    f"{key}: expected more than 0 for {name!r}, got {value}; "
-                    "give it here or give the belief an output_noise"
-                )
-                raise ValueError(msg)
-        return R
 
-    def check_sensors(self, key: str, chosen: Mapping[str, Any], *, explicit: bool) -> None:
-        """Raise ValueError if `chosen`, given by the user under `key`, names a sensor that the filter does not have."""
-        unknown = [name for name in chosen if name not in self.model.sensors]
-        if explicit and unknown:
-            msg = f"{key}: expected sensors of {list(self.model.sensors)}, got {unknown}"
-            raise ValueError(msg)
-
-    def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the readings of a block as rows at the fastest rate, NaN where none is due, infinite where one is
-        missing or no rate.
+    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
+        """Filter the next block.
 
         Parameters
         ----------
         readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings of every sensor in this block [rad/s].
+            Readings that are due in the block [rad/s]; not finite means predict only.
 
         Returns
         -------
-        ndarray, shape (n_sensor, n_time)
-            Readings [rad/s].
+        EstimateBlock
+            At the fastest rate, shape (n_time,).
 
         Raises
         ------
         ValueError
-            If a sensor is missing or unknown, or has not as many readings as are due in the block.
+            If a sensor is missing, unknown or has not as many readings as are due.
         """
-        if set(readings) != set(self.model.sensors):
-            msg = f"readings: expected the sensors {sorted(self.model.sensors)}, got {sorted(readings)}"
-            raise ValueError(msg)
-        arrays = [np.asarray(readings[name], dtype=float) for name in self.model.sensors]
-        n_time = arrays[self.model.strides.index(1)].size
-        Z = np.full((len(arrays), n_time), np.nan)
-        for name, stride, values, row in zip(self.model.sensors, self.model.strides, arrays, Z, strict=True):
-            due = row[-self._sample % stride :: stride]
-            if values.shape != due.shape:
-                msg = (
-                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples "
-                    f"from {self._sample} on), got shape {values.shape}"
-                )
-                raise ValueError(msg)
-            due[:] = np.where(np.abs(values) <= LARGEST_RATE, values, np.inf)
-        self._sample += n_time
-        return Z
+        Z = self.schedule.spread(readings)
+        # Here, before any filter sees them, is the place to strike out readings that are none.
+        Z.flags.writeable = False
+        names = self.rows.names(self.schedule.sensors)
+        out = np.full((HEADER_ROWS + len(names), Z.shape[1]), np.nan)
+        self._advance(Z, out)
+        shown = {name: row for name, row in zip(names, out[HEADER_ROWS:], strict=True) if name is not None}
+        return EstimateBlock(out[RATE], out[STD], shown)

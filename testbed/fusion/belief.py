@@ -15,7 +15,7 @@ from testbed.parts import Part
 from testbed.units import RateDensity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import control
 
@@ -165,6 +165,14 @@ def _shipped(name: str) -> dict[str, SensorBelief]:
         raise UnknownNameError(kind, name, names)
     content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
     return {key: SensorBelief.model_validate(value, context={"border": True}) for key, value in content.items()}
+
+
+def check_belief(belief: Mapping[str, SensorBelief], sensors: Iterable[str]) -> None:
+    """Raise ValueError if there is no sensor, or one of which nothing is believed."""
+    names = list(sensors)
+    if not names or any(name not in belief for name in names):
+        msg = f"belief: expected one for each of {names}, got {list(belief)}"
+        raise ValueError(msg)
 
 
 def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:

@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import block_diag, expm
 
+from testbed.fusion.belief import check_belief
+from testbed.fusion.schedule import common_clock
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -98,31 +101,13 @@ def build_model(
     Paper 1 (doi 10.1109/TIM.2024.3375962), equations (7), (18)-(20).
     """
     sensors = tuple(sample_rate_hz)
-    missing = [name for name in sensors if name not in belief]
-    if missing or not sensors:
-        msg = f"belief: expected one for each of {list(sensors)}, got {list(belief)}"
-        raise ValueError(msg)
-    fastest, strides = _strides(sample_rate_hz)
+    check_belief(belief, sensors)
+    fastest, strides = common_clock(sample_rate_hz)
     believed = [belief[name] for name in sensors]
     A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
     F, Q = van_loan(A, Qc, 1.0 / fastest)
     R = np.array([one.output_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
     return FusionModel(sensors, fastest, strides, F, Q, H, R, _start_covariance(order, F.shape[0]))
-
-
-def _strides(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
-    for name, value in sample_rate_hz.items():
-        if not (math.isfinite(value) and value > 0.0):
-            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
-            raise ValueError(msg)
-    fastest = float(max(sample_rate_hz.values()))
-    strides = tuple(round(fastest / value) for value in sample_rate_hz.values())
-    for (name, value), stride in zip(sample_rate_hz.items(), strides, strict=True):
-        # A nanosecond of drift per second of record is below any logger's clock.
-        if not math.isclose(stride * value, fastest, rel_tol=1e-9):
-            msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
-            raise ValueError(msg)
-    return fastest, strides
 
 
 def _start_covariance(order: int, n_state: int) -> FloatArray:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from testbed.fusion.base import DEG, CovarianceParameters, Variance
 from testbed.fusion.filters.shakf import AdaptiveFilter
+from testbed.fusion.model_filter import DEG, CovarianceParameters, Variance
 from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:

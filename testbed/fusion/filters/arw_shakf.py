@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from testbed.fusion.bands import Bands, load_bands
-from testbed.fusion.base import DEG
+from testbed.fusion.base import Rows
 from testbed.fusion.filters.shakf import SageHusa, SageHusaParameters
-from testbed.fusion.kernels import covariance as kernels
+from testbed.fusion.model_filter import DEG
 from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
@@ -112,11 +112,7 @@ class ArwShakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ArwShakfParameters
-    _diagnostics: ClassVar[dict[str, int]] = SageHusa._diagnostics | {
-        "N": kernels.INCREMENTS,
-        "band": kernels.BAND,
-        "S": kernels.INFLATION,
-    }
+    rows = Rows(SageHusa.rows.once, ("innovation", "innovation_variance", "R", "N", "band", "S"))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ArwShakfParameters

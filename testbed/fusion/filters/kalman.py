@@ -7,24 +7,16 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, CovarianceParameters, EstimateBlock, Variance
-from testbed.fusion.kernels.covariance import (
-    HEADER_ROWS,
-    INNOVATION,
-    INNOVATION_ROWS,
-    INNOVATION_VARIANCE,
-    RATE,
-    STD,
-    kalman_kernel,
-)
+from testbed.fusion.base import Rows
+from testbed.fusion.kernels.covariance import kalman_kernel
+from testbed.fusion.model_filter import DEG, CovarianceParameters, ModelFilter, Variance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike
-
     from testbed.fusion.belief import SensorBelief
     from testbed.parts import Part
+    from testbed.signals import FloatArray
 
 
 class KalmanParameters(CovarianceParameters):
@@ -41,7 +33,7 @@ class KalmanParameters(CovarianceParameters):
     R: dict[str, Variance] = Field(default={})
 
 
-class Kalman(BlockFilter):
+class Kalman(ModelFilter):
     r"""Kalman filter of the augmented model with fixed Q and R, in Joseph form.
 
     .. math:: x^- = F x,\; P^- = F P F' + Q,\; K = P^- H' (H P^- H' + R)^{-1},\; x = x^- + K e,\;
@@ -65,6 +57,7 @@ class Kalman(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = KalmanParameters
+    rows = Rows(per_sensor=("innovation", "innovation_variance"))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: KalmanParameters
@@ -75,31 +68,6 @@ class Kalman(BlockFilter):
         self._started = False
         self._run = kalman_kernel(self._x.size, self._R.size, self._form)
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
-        """Filter the next block.
-
-        Parameters
-        ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
-
-        Returns
-        -------
-        EstimateBlock
-            At the fastest rate, shape (n_time,).
-
-        Raises
-        ------
-        ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
-        """
-        Z = self.spread(readings)
-        out = np.empty((HEADER_ROWS + INNOVATION_ROWS * len(Z), Z.shape[1]))
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         progress = (self._outside, self._started)
         self._started = self._run(self._x, self._P, self._F, self._Q, self._H, self._R, Z, *progress, out)
-        diagnostics = {}
-        for i, name in enumerate(self.model.sensors):
-            row = HEADER_ROWS + INNOVATION_ROWS * i
-            diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
-            diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
-        return EstimateBlock(out[RATE], out[STD], diagnostics)

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, CovarianceParameters, EstimateBlock, Variance
-from testbed.fusion.kernels import covariance as kernels
-from testbed.fusion.kernels.covariance import ADAPTIVE_HEADER_ROWS, ADAPTIVE_ROWS, SENSOR, adaptive_kernel
+from testbed.fusion.base import Rows
+from testbed.fusion.kernels.covariance import SENSOR, adaptive_kernel
+from testbed.fusion.model_filter import DEG, CovarianceParameters, ModelFilter, Variance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike
-
     from testbed.fusion.belief import SensorBelief
     from testbed.parts import Part
+    from testbed.signals import FloatArray
 
 
 class SageHusaParameters(CovarianceParameters):
@@ -52,16 +51,13 @@ class ShakfParameters(SageHusaParameters):
     use_input_noise: bool = False
 
 
-class AdaptiveFilter(BlockFilter):
+class AdaptiveFilter(ModelFilter):
     """The Kalman filter of `Kalman` on the adaptive kernel, as yet without any adaptation; base of the adaptive
     filters.
     """
 
-    _diagnostics: ClassVar[dict[str, int]] = {
-        "innovation": kernels.INNOVATION,
-        "innovation_variance": kernels.INNOVATION_VARIANCE,
-        "R": kernels.R_USED,
-    }
+    # The kernel's other rows have a meaning only where there are bands.
+    rows = Rows(("Q_rate", "guard_hits"), ("innovation", "innovation_variance", "R", None, None, None))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: CovarianceParameters
@@ -75,33 +71,9 @@ class AdaptiveFilter(BlockFilter):
         self._forget = 0.0
         self._run = adaptive_kernel(self._x.size, n_sensor, self._form)
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
-        """Filter the next block.
-
-        Parameters
-        ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
-
-        Returns
-        -------
-        EstimateBlock
-            At the fastest rate, shape (n_time,).
-
-        Raises
-        ------
-        ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
-        """
-        Z = self.spread(readings)
-        out = np.empty((ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * len(Z), Z.shape[1]))
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         state = (self._sensors, self._windows, self._chosen, self._progress, self._forget)
         self._run(self._x, self._P, self._F, self._Q, self._H, Z, *state, out)
-        diagnostics = {"Q_rate": out[kernels.Q_RATE], "guard_hits": out[kernels.GUARD_HITS]}
-        for i, sensor in enumerate(self.model.sensors):
-            row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
-            diagnostics |= {f"{name}_{sensor}": out[row + at] for name, at in self._diagnostics.items()}
-        return EstimateBlock(out[kernels.RATE], out[kernels.STD], diagnostics)
 
 
 def _sensor_records(n_sensor: int) -> np.ndarray:

@@ -8,25 +8,17 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from testbed.fusion.analysis.optimum import optimum, settled_filters
-from testbed.fusion.base import BlockFilter, EstimateBlock, FilterParameters
-from testbed.fusion.kernels.covariance import (
-    HEADER_ROWS,
-    INNOVATION,
-    INNOVATION_ROWS,
-    INNOVATION_VARIANCE,
-    RATE,
-    STD,
-    fixed_gain_kernel,
-)
+from testbed.fusion.base import BlockFilter, Rows
+from testbed.fusion.kernels.covariance import fixed_gain_kernel
+from testbed.fusion.model import build_model
 from testbed.parts import Part
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike
-
     from testbed.fusion.belief import SensorBelief
+    from testbed.signals import FloatArray
 
 
 class SteadyStateParameters(Part):
@@ -68,14 +60,15 @@ class SteadyState(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = SteadyStateParameters
+    rows = Rows(per_sensor=("innovation", "innovation_variance"))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters
     ) -> None:
-        # Sensors without a belief are refused first, with the message that all filters share.
-        super().__init__(belief, sample_rate_hz, FilterParameters(order=1, q=1.0))
+        super().__init__(belief, sample_rate_hz, parameters)
         best = optimum(belief, sample_rate_hz, [(parameters.frequency, parameters.amplitude)])
-        super().__init__(belief, sample_rate_hz, FilterParameters(order=best.order, q=best.q))
+        self.model = build_model(belief, sample_rate_hz, order=best.order, q=best.q)
+        self._x, self._P = np.zeros(len(self.model.F)), self.model.P0.copy()
         fixed = settled_filters(belief, sample_rate_hz, order=best.order, q=np.array([best.q]))
         self._K = np.ascontiguousarray(fixed.K[:, 0])
         self._C = np.einsum("ij,pjk,ik->pi", self.model.H, fixed.prior[:, 0], self.model.H) + self.model.R
@@ -83,32 +76,6 @@ class SteadyState(BlockFilter):
         self._progress = np.zeros(2 + len(self.model.H), dtype=np.int64)
         self._run = fixed_gain_kernel(self._x.size, len(self.model.H))
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
-        """Filter the next block.
-
-        Parameters
-        ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
-
-        Returns
-        -------
-        EstimateBlock
-            At the fastest rate, shape (n_time,).
-
-        Raises
-        ------
-        ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
-        """
-        Z = self.spread(readings)
-        out = np.empty((HEADER_ROWS + INNOVATION_ROWS * len(Z), Z.shape[1]))
-        model = self.model
-        gains = (self._K, self._C, self._settled)
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+        model, gains = self.model, (self._K, self._C, self._settled)
         self._run(self._x, self._P, model.F, model.Q, model.H, *gains, Z, self._progress, out)
-        diagnostics = {}
-        for i, name in enumerate(model.sensors):
-            row = HEADER_ROWS + INNOVATION_ROWS * i
-            diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
-            diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
-        return EstimateBlock(out[RATE], out[STD], diagnostics)

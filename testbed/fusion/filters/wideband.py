@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import DEG, BlockFilter, EstimateBlock, FormParameters
-from testbed.fusion.kernels.bank import BANK_HEADER_ROWS, BANK_ROWS, LEVEL, REFUSED, bank_kernel
-from testbed.fusion.kernels.covariance import INNOVATION, INNOVATION_VARIANCE, RATE, STD
+from testbed.fusion.base import Rows
+from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.model import build_model
+from testbed.fusion.model_filter import DEG, FormParameters, ModelFilter
 from testbed.units import PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike
 
     from testbed.fusion.belief import SensorBelief
     from testbed.parts import Part
@@ -62,7 +60,7 @@ class WidebandParameters(FormParameters):
     stuck_after: Annotated[int, Field(ge=0)] = 10
 
 
-class Wideband(BlockFilter):
+class Wideband(ModelFilter):
     r"""Bank of Kalman filters with process noise :math:`q_1 \ldots q_M`, mixed by innovation likelihood.
 
     .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
@@ -92,6 +90,7 @@ class Wideband(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = WidebandParameters
+    rows = Rows(("log10_q",), ("innovation", "innovation_variance", "refused"))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: WidebandParameters
@@ -124,36 +123,10 @@ class Wideband(BlockFilter):
         models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
         return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
-        """Filter the next block.
-
-        Parameters
-        ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
-
-        Returns
-        -------
-        EstimateBlock
-            At the fastest rate, shape (n_time,).
-
-        Raises
-        ------
-        ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
-        """
-        Z = self.spread(readings)
-        out = np.empty((BANK_HEADER_ROWS + BANK_ROWS * len(Z), Z.shape[1]))
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         model, (of_F, of_H) = self.model, self._columns
         mixing = (self._score, self._watch, self._setting, self._levels)
         self._run(self._x, self._P, model.F, of_F, self._Q, model.H, of_H, self._R, Z, *mixing, out)
-        diagnostics = {"log10_q": out[LEVEL]}
-        for i, name in enumerate(model.sensors):
-            row = BANK_HEADER_ROWS + BANK_ROWS * i
-            diagnostics[f"innovation_{name}"] = out[row + INNOVATION]
-            diagnostics[f"innovation_variance_{name}"] = out[row + INNOVATION_VARIANCE]
-            diagnostics[f"refused_{name}"] = out[row + REFUSED]
-        return EstimateBlock(out[RATE], out[STD], diagnostics)
 
 
 def _columns(matrix: FloatArray) -> np.ndarray:

@@ -30,8 +30,6 @@ CONVENTIONAL, JOSEPH, SQUARE_ROOT = 0, 1, 2
 # Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
 RATE, STD, HEADER_ROWS = 0, 1, 2
 INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
-# A reading beyond this [rad/s] is no rate but a missing reading: its square would overflow.
-LARGEST_RATE = 1e6
 # A reading that many standard deviations of its innovation off is a spike and left out, but not more than PATIENCE in a
 # row: what lasts longer is the signal. So wide that the lag behind a fast signal stays inside, and a spike inside does
 # no harm that lasts.

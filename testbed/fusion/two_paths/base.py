@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from testbed.fusion.base import BlockFilter, EstimateBlock, FilterParameters
-from testbed.fusion.kernels.covariance import GATE, PATIENCE, RATE, STD
+from testbed.fusion.base import BlockFilter, Rows
+from testbed.fusion.kernels.covariance import GATE, PATIENCE
+from testbed.fusion.model import build_model
 from testbed.fusion.two_paths.design import (
     HIGH_HZ,
     LOW_HZ,
@@ -19,15 +20,13 @@ from testbed.fusion.two_paths.design import (
     input_psd,
     low_pass,
 )
-from testbed.fusion.two_paths.kernel import MEMORY_ROWS, OUT_ROWS, SLOW_INNOVATION, two_paths
+from testbed.fusion.two_paths.kernel import MEMORY_ROWS, two_paths
 from testbed.fusion.two_paths.noise import noise_variance
 from testbed.parts import Part
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-
-    from numpy.typing import ArrayLike
 
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
@@ -83,8 +82,10 @@ class TwoPaths(BlockFilter):
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters
     ) -> None:
-        super().__init__(belief, sample_rate_hz, FilterParameters(order=1, q=0.0))
+        super().__init__(belief, sample_rate_hz, parameters)
+        self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self._slow, self._fast = _roles(belief, self.model)
+        self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
         order = self.order(fast)
         self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
@@ -136,29 +137,8 @@ class TwoPaths(BlockFilter):
         """
         raise NotImplementedError
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
-        """Filter the next block.
-
-        Parameters
-        ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
-
-        Returns
-        -------
-        EstimateBlock
-            At the fastest rate, shape (n_time,).
-
-        Raises
-        ------
-        ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
-        """
-        Z = self.spread(readings)
-        out = np.empty((OUT_ROWS, Z.shape[1]))
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         two_paths(self._x, self._memory, *self._matrices, self._setting, Z[self._fast], Z[self._slow], out)
-        name = self.model.sensors[self._slow]
-        return EstimateBlock(out[RATE], out[STD], {f"innovation_{name}": out[SLOW_INNOVATION]})
 
 
 def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int, int]:

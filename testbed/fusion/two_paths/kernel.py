@@ -9,8 +9,8 @@ from numba import njit
 
 from testbed.fusion.kernels.covariance import RATE, STD
 
+# Row of the output behind RATE and STD.
 SLOW_INNOVATION = 2
-OUT_ROWS = 3
 # Rows of `memory`, what stays between blocks.
 STARTED, READING, HELD, ESTIMATE, BLIND_TIME, SLOW_WAIT, DRIFT_VARIANCE, STEP, FAST_OUTSIDE, SLOW_OUTSIDE = range(10)
 MEMORY_ROWS = 10

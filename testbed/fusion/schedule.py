@@ -1,0 +1,102 @@
+"""When each sensor has a reading: several sample rates on the clock of the fastest."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from testbed.signals import FloatArray
+
+# A reading beyond this [rad/s] is no rate but a missing reading: its square would overflow.
+LARGEST_RATE = 1e6
+
+
+def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
+    """Return the fastest rate [Hz] and the stride of each sensor on that clock.
+
+    Parameters
+    ----------
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+
+    Raises
+    ------
+    ValueError
+        If a rate is not positive or does not divide the fastest one.
+    """
+    for name, value in sample_rate_hz.items():
+        if not (math.isfinite(value) and value > 0.0):
+            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
+            raise ValueError(msg)
+    fastest = float(max(sample_rate_hz.values()))
+    strides = tuple(round(fastest / value) for value in sample_rate_hz.values())
+    for (name, value), stride in zip(sample_rate_hz.items(), strides, strict=True):
+        # A nanosecond of drift per second of record is below any logger's clock.
+        if not math.isclose(stride * value, fastest, rel_tol=1e-9):
+            msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
+            raise ValueError(msg)
+    return fastest, strides
+
+
+class Schedule:
+    """Spreads the readings of several sensors over the clock of the fastest, block after block.
+
+    Parameters
+    ----------
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz]; the fastest is an integer multiple of every other. All start at t = 0.
+
+    Raises
+    ------
+    ValueError
+        If a rate is not positive or does not divide the fastest one.
+    """
+
+    def __init__(self, sample_rate_hz: Mapping[str, float]) -> None:
+        self.sensors = tuple(sample_rate_hz)
+        self.sample_rate_hz, self.strides = common_clock(sample_rate_hz)
+        self._sample = 0
+
+    def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
+        """Return the readings of the next block as rows at the fastest rate, NaN where none is due, infinite where one
+        is missing or no rate.
+
+        Parameters
+        ----------
+        readings : mapping of str to array_like, shape (n_sensor_samples,)
+            Readings of every sensor in this block [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (n_sensor, n_time)
+            Readings [rad/s], a copy.
+
+        Raises
+        ------
+        ValueError
+            If a sensor is missing or unknown, or has not as many readings as are due in the block.
+        """
+        if set(readings) != set(self.sensors):
+            msg = f"readings: expected the sensors {sorted(self.sensors)}, got {sorted(readings)}"
+            raise ValueError(msg)
+        arrays = [np.asarray(readings[name], dtype=float) for name in self.sensors]
+        n_time = arrays[self.strides.index(1)].size
+        Z = np.full((len(arrays), n_time), np.nan)
+        for name, stride, values, row in zip(self.sensors, self.strides, arrays, Z, strict=True):
+            due = row[-self._sample % stride :: stride]
+            if values.shape != due.shape:
+                msg = (
+                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples from "
+                    f"{self._sample} on), got shape {values.shape}"
+                )
+                raise ValueError(msg)
+            due[:] = np.where(np.abs(values) <= LARGEST_RATE, values, np.inf)
+        self._sample += n_time
+        return Z
