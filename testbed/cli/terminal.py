@@ -177,12 +177,14 @@ def _print_table(console: Console, table: Mapping[str, Any]) -> None:
     if table["torque_limit_nm"] is not None:
         torque += f" of {_number(table['torque_limit_nm'])} N m, margin {100 * table['torque_margin']:.0f} %"
     noise = f"arithmetic noise of the truth {_number(table['truth_noise_deg_s'])} deg/s"
-    step = _step(table["step_s"], table["step_factor"], table["step_error"])
+    step = _step(table["engine"] == "modal", table["step_s"], table["step_factor"], table["step_error"])
     console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True, highlight=False)
 
 
-def _step(step: float, factor: float, error: float | None) -> str:
-    measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
+def _step(modal: bool, step: float, factor: float, error: float | None) -> str:
+    measured = "" if error is None else f", error {error:.1e} of the largest rate against MuJoCo at 50 us"
+    if modal:
+        return f"played by its modes, exact over each hold of {1e6 * step:g} us{measured}"
     length = f"{step:g} s" if step >= 1.0 else f"{1e6 * step:g} us"
     return f"integration step {length}, {factor:g} times the hold{measured}"
 
@@ -267,7 +269,7 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
     noise = f"arithmetic noise of the truth {_number(math.degrees(facts.truth_noise))} deg/s rms"
-    step = _step(facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    step = _step(facts.step.modal, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:
             console.print(f"turntable: {line}", soft_wrap=True, highlight=False)

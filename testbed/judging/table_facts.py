@@ -160,4 +160,10 @@ class TableMetrics:
 
 
 def _step(choice: StepChoice) -> dict[str, Any]:
-    return {"step_s": choice.step, "step_error": choice.error, "step_factor": choice.holds / choice.substeps}
+    engine = "modal" if choice.modal else "mujoco"
+    return {
+        "engine": engine,
+        "step_s": choice.step,
+        "step_error": choice.error,
+        "step_factor": choice.holds / choice.substeps,
+    }

@@ -25,6 +25,8 @@ from testbed.models.turntable.linear import linear_plant
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from numpy.typing import NDArray
+
     from testbed.models.turntable.linear import LinearPlant
     from testbed.models.turntable.parameters import TurntableParameters
     from testbed.signals import ComplexArray, FloatArray
@@ -105,7 +107,7 @@ def modes_of(linear: LinearPlant, x0: FloatArray, dt: float) -> Modes:
     )
 
 
-def _padded(modes: ComplexArray) -> ComplexArray:
+def _padded(modes: NDArray[Any]) -> ComplexArray:
     """Return an array with modes along its last axis, made longer by modes that are at rest and seen by nobody."""
     short = -modes.shape[-1] % _VECTOR
     return np.pad(modes, [(0, 0)] * (modes.ndim - 1) + [(0, short)])
@@ -232,9 +234,10 @@ class ModalEngine:
 
 
 def _cogging(parameters: TurntableParameters, angle: float) -> FloatArray:
-    """Return amplitude, periods, phase at the start, and torque and slope there, one row a harmonic."""
-    rows = np.zeros((len(parameters.cogging), 5))
-    for row, one in zip(rows, parameters.cogging, strict=True):
+    """Return amplitude, periods, phase at the start, and torque and slope there, one row a harmonic of the motor."""
+    harmonics = parameters.cogging if parameters.has_plant else ()
+    rows = np.zeros((len(harmonics), 5))
+    for row, one in zip(rows, harmonics, strict=True):
         phase = one.periods * angle + one.phase
         slope = one.torque * one.periods * np.cos(phase)
         row[:] = one.torque, one.periods, phase, one.torque * np.sin(phase), slope
