@@ -160,9 +160,8 @@ class TableMetrics:
 
 
 def _step(choice: StepChoice) -> dict[str, Any]:
-    engine = "modal" if choice.modal else "mujoco"
     return {
-        "engine": engine,
+        "engine": choice.engine,
         "step_s": choice.step,
         "step_error": choice.error,
         "step_factor": choice.holds / choice.substeps,

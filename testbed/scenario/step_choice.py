@@ -56,6 +56,11 @@ class StepChoice:
     modal: bool = False
 
     @property
+    def engine(self) -> str:
+        """What plays the plant, "modal" or "mujoco"."""
+        return "modal" if self.modal else "mujoco"
+
+    @property
     def step(self) -> float:
         """Integration step [s]."""
         return self.holds / self.substeps / self.base_rate_hz
