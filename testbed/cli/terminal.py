@@ -100,14 +100,16 @@ def _print_table(console: Console, table: TurntableMetrics | None) -> None:
     if table.torque_limit_nm is not None and table.torque_margin is not None:
         torque += f" of {number(table.torque_limit_nm)} N m, margin {100 * table.torque_margin:.0f} %"
     noise = f"arithmetic noise of the truth {number(table.truth_noise_deg_s)} deg/s"
-    step = _step(table.step_s, table.step_factor, table.step_error)
+    step = _step(table.engine, table.step_s, table.step_factor, table.step_error)
     console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True, highlight=False)
 
 
-def _step(step: float | None, factor: float | None, error: float | None) -> str:
+def _step(engine: str | None, step: float | None, factor: float | None, error: float | None) -> str:
     if step is None or factor is None:
         return "integration step unknown"
-    measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
+    measured = "" if error is None else f", error {error:.1e} of the largest rate against MuJoCo at 50 us"
+    if engine == "modal":
+        return f"played by its modes, exact over each hold of {1e6 * step:g} us{measured}"
     length = f"{step:g} s" if step >= 1.0 else f"{1e6 * step:g} us"
     return f"integration step {length}, {factor:g} times the hold{measured}"
 
@@ -175,7 +177,7 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
     noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
-    step = _step(facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    step = _step(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:
             console.print(f"turntable: {line}", soft_wrap=True, highlight=False)

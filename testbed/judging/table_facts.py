@@ -78,6 +78,7 @@ class TableFacts:
             "torque_limit_nm": limit,
             "torque_margin": None if limit is None else 1.0 - self.required_torque / limit,
             "truth_noise_deg_s": float(np.rad2deg(self.truth_noise)),
+            "engine": self.step.engine,
             "step_s": self.step.step,
             "step_factor": self.step.holds / self.step.substeps,
             "step_error": self.step.error,
