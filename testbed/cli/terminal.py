@@ -124,6 +124,7 @@ def print_metrics(metrics: Mapping[str, Any], folder: Path) -> None:
         if row.get("missing"):
             console.print(f"{name}: {row['missing']} readings lost")
     _print_budget(console, metrics["budget"])
+    _print_beliefs(console, metrics["fusion"])
     _print_claims(console, metrics["fusion"])
     _print_table(console, metrics["turntable"])
     for bound in metrics["expectations"]:
@@ -154,6 +155,16 @@ def _error_unit(metrics: Mapping[str, Any]) -> tuple[str, float]:
     errors = [row["rmse_deg_s"] for kind in ("sensors", "fusion") for row in metrics[kind].values()]
     known = [error for error in errors if error is not None]
     return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
+
+
+def _print_beliefs(console: Console, fusion: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print what the filters were told of the sensors, those of one belief together."""
+    words = {
+        row["belief"]: [name for name, other in fusion.items() if other["belief"] == row["belief"]]
+        for row in fusion.values()
+    }
+    for belief, names in words.items():
+        console.print(f"belief of {', '.join(names)}: {belief}", soft_wrap=True, highlight=False)
 
 
 def _print_claims(console: Console, fusion: Mapping[str, Mapping[str, Any]]) -> None:

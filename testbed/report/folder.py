@@ -54,6 +54,7 @@ class SourceMetrics(_Metrics):
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
     consistency: ConsistencyMetrics | None = None
+    belief: str | None = None
     lines: list[LineMetrics] | None = None
 
 

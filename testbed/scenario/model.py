@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
+from testbed.fusion.belief import declared
 from testbed.models.motion import MotionProfile
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
@@ -100,7 +101,6 @@ class FilterSpec:
     factory: Callable[..., Any]
     parameters: Any
     belief: Mapping[str, SensorBelief]
-    belief_name: Any
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class Scenario:
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
             "fusion": {
-                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
             "expect": _expectations(self.expect),
@@ -196,6 +196,12 @@ def dump(part: BaseModel) -> dict[str, Any]:
     written = part.model_dump(mode="json", context={"border": True})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def _belief(spec: FilterSpec) -> dict[str, Any] | str:
+    """Return what a filter believes; the exact belief as the word, since the sensors stand beside it."""
+    word = declared(spec.belief)
+    return word if word == "exact" else {name: dump(one) for name, one in spec.belief.items()}
 
 
 def _parameters(spec: FilterSpec) -> dict[str, Any]:
