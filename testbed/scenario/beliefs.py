@@ -24,9 +24,9 @@ EXACT = "exact"
 
 _LOWEST_HZ, _POINTS = 1e-2, 121
 _FIT_MISFIT = 1e-3
-# (real poles, pairs) in the order in which they are tried: a pair may be two real poles, and its search ends in fewer
-# local minima; real poles alone find what is made of them.
-_FORMS = ((1, 0), (0, 1), (1, 1), (0, 2), (1, 2), (5, 0), (3, 2), (5, 1))
+# (real poles, pairs) in the order in which they are tried. A pair may become two real poles, and its search ends in
+# fewer local minima than one for two real poles does.
+_FORMS = tuple((n % 2, n // 2) for n in range(1, 8))
 # The noise is fitted from here up [Hz]: what rises below (1/f) is not in it.
 _WHITE_FROM_HZ = 1.0
 # An output noise this much below the input noise keeps R positive and changes nothing.
@@ -156,6 +156,8 @@ def _white_noise(sensor: Sensor, freq: FloatArray) -> tuple[float, float]:
     from scipy.optimize import nnls
 
     density = sensor.input_noise_psd(freq)
+    if not density.any():
+        return 0.0, 0.0
     terms = np.stack([np.ones(density.size), 1.0 / np.abs(sensor.response(freq)) ** 2], axis=1)
     size = np.linalg.norm(terms / density[:, None], axis=0)
     level, _ = nnls(terms / density[:, None] / size, np.ones(density.size))
