@@ -104,10 +104,10 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     ScenarioError
         If it is no run folder, the sensor is not in it or its readings have gaps.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
     from testbed.scenario.loader import load_scenario
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     scenario = load_scenario(folder / "scenario.yaml")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")

@@ -160,4 +160,9 @@ class TableMetrics:
 
 
 def _step(choice: StepChoice) -> dict[str, Any]:
-    return {"step_s": choice.step, "step_error": choice.error, "step_factor": choice.holds / choice.substeps}
+    return {
+        "engine": choice.engine,
+        "step_s": choice.step,
+        "step_error": choice.error,
+        "step_factor": choice.holds / choice.substeps,
+    }
