@@ -85,6 +85,11 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         return self
 
     @property
+    def resolution(self) -> float:
+        """One count of the word [rad/s]."""
+        return 1.0 / self.sensitivity
+
+    @property
     def transfer_function(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Numerator and denominator of the low-pass in s [rad/s], highest power first."""
         if self.numerator is not None and self.denominator is not None:
@@ -119,7 +124,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate, its terms at 20 kHz; see `Sensor.input_noise_psd`."""
-        rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
+        rounding = rounding_psd(self.resolution, self.sample_rate)
         terms = self.noise_psd(freq_hz, _INPUT_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
@@ -139,7 +144,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
             ("rate random walk K", f"{60.0 * hour * self.rate_random_walk:.6g} deg/h/sqrt(h)"),
             ("quantisation Q", f"{1e6 * self.quantization:.6g} urad"),
             ("Markov bias, correlation time", f"{hour * self.markov_bias:.6g} deg/h, {self.markov_time:g} s"),
-            ("one count of the word", f"{np.rad2deg(1.0 / self.sensitivity):.6g} deg/s"),
+            ("one count of the word", f"{np.rad2deg(self.resolution):.6g} deg/s"),
             *((f"Allan deviation at {tau:g} s, before the low-pass", f"{allan[tau]:.6g} deg/h") for tau in allan),
             ("delay by decimation and age", f"{1e3 * delay:.6g} ms"),
         ]
@@ -172,7 +177,7 @@ class MemsGyroStage:
         self._decimator: Decimator | AgedSampler = Decimator(ratio)
         if gyro.jitter:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
-        self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.range, rounding=gyro.noise)
+        self._converter = Converter(gyro.resolution, gyro.word_bits, gyro.range, rounding=gyro.noise)
         self._losses = stream("dropped")
         self._white = gyro.angle_random_walk * input_rate_hz**0.5 if gyro.noise else 0.0
         self._before: np.random.Generator | None = stream("before")
