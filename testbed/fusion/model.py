@@ -19,6 +19,7 @@ from testbed.fusion.belief import check_belief
 from testbed.fusion.coloured import slow_noise
 from testbed.fusion.schedule import common_clock
 from testbed.fusion.start import (
+    REST_STD,
     StartKind,
     alternating_response,
     constant_response,
@@ -187,7 +188,9 @@ def _start(
     still[0], still[rest] = 1.0, constant_response(sensors, drive)
     for k in range(1, order):
         P0[k, k] = (_START_STD * (2.0 * np.pi * _START_FREQ_HZ * _TIME_UNIT) ** k) ** 2
-    if start == "unknown":
+    if start == "rest":
+        P0 += REST_STD**2 * np.outer(still, still)
+    else:
         spread = unknown_spread(believed)
         moving = np.zeros(len(A))
         moving[0], moving[rest] = 1.0, np.abs(alternating_response(sensors, drive))

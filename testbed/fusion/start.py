@@ -5,9 +5,9 @@ r"""What a filter knows before its first reading: the covariance of the augmente
 
 .. math:: P_0 = \sigma_{dc}^2\, g g' + \sigma_{ac}^2\, \mathrm{diag}(1, |h_i|^2) + P_{own},
 
-g the states for a unit constant rate, h those of the sensors for a unit sine of 0.5 Hz. `rest`: the rate is known, and
-the sensors are in equilibrium with it; only P_own is left, the stationary covariance of the sensors' own noise, without
-which the first reading of a sensor whose noise passes its dynamics would count as exact.
+g the states for a unit constant rate, h those of the sensors for a unit sine of 0.5 Hz. `rest`: the rate is known (to
+1e-5 deg/s), and the sensors are in equilibrium with it; only P_own is left, the stationary covariance of the sensors'
+own noise, without which the first reading of a sensor whose noise passes its dynamics would count as exact.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ StartKind = Literal["unknown", "rest"]
 # More is neither needed, since readings soon outweigh it (`benchmarks/bench_starts.py` starts inside 200 deg/s), nor
 # harmless: with 289 deg/s, an even spread over 500 deg/s, P loses a factor of 200 more of its digits.
 _CONSTANT_STD = math.radians(20.0)
+# A rest is known to this [rad/s], below what any of the sensors tells in hours; a claim of 0 would be no claim.
+REST_STD = math.radians(1e-5)
 _ALTERNATING_SHARE = 0.1
 _ALTERNATING_HZ = 0.5
 

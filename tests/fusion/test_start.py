@@ -7,7 +7,7 @@ import pytest
 
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.model import build_model
-from testbed.fusion.start import unknown_spread
+from testbed.fusion.start import REST_STD, unknown_spread
 
 DEG = np.pi / 180.0
 W = 30.0  # rad/s
@@ -19,7 +19,7 @@ RATES = {"gyro": 1000.0}
 def test_rest_leaves_the_sensors_own_noise_only() -> None:
     """X' = -w x + w n with white n of density N^2 has the variance N^2 w / 2."""
     P0 = build_model({"gyro": GYRO}, RATES, order=1, q=1.0, start="rest").P0
-    np.testing.assert_allclose(P0, np.diag([0.0, 4e-5**2 * W / 2.0]), rtol=1e-12)
+    np.testing.assert_allclose(P0, REST_STD**2 + np.diag([0.0, 4e-5**2 * W / 2.0]), rtol=1e-12)
 
 
 @pytest.mark.oracle
@@ -45,7 +45,7 @@ def test_slow_noise_has_settled_in_the_sensor_before_the_record() -> None:
     assert rate[-1] == 0.0
     assert variance[-1] == pytest.approx(1e-6, rel=1e-12)
     wanted = 4e-5**2 * W / 2.0 + np.sum(variance * W / (W + rate))
-    assert model.P0[1, 1] == pytest.approx(wanted, rel=1e-6)
+    assert model.P0[1, 1] == pytest.approx(REST_STD**2 + wanted, rel=1e-6)
     np.testing.assert_allclose(model.P0[1, 2:], variance * W / (W + rate), rtol=1e-6)
 
 
