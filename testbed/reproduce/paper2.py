@@ -17,6 +17,8 @@ from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.metrics.spectra import WelchDensity, log_average
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,8 +27,7 @@ if TYPE_CHECKING:
     from testbed.sensors.mhd_ars import MhdArs
     from testbed.signals import ComplexArray, FloatArray
 
-CLOCK_HZ = 20_000.0
-DEG = np.pi / 180.0
+CLOCK_HZ = BASE_RATE_HZ
 CHANNELS = ("mems_gyro", "mhd_ars", "fused")
 # Volts per (deg/s) of the paper's fused output.
 PAPER_SCALE = 0.04

@@ -1,4 +1,4 @@
-"""The figures of paper 1, drawn at the width of a journal's column from the tables of `paper1_data`."""
+"""The figures of paper 1, drawn at the width of a journal's column from the tables of its `data`."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from testbed.reproduce.drawing import (
     smooth,
 )
 from testbed.reproduce.paper1.data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
-from testbed.reproduce.paper1.runs import DEG, FILTERS, SENSORS
+from testbed.reproduce.paper1.runs import FILTERS, SENSORS
 from testbed.runs.atomic import write_text
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -5,18 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from testbed.recording.envelope import N_BINS, Envelope
+from testbed.recording.thinning import N_BINS, Thinning
 
 
 def choose(values, sizes, detail=(0, 0)):
-    """Run an Envelope over `values` in blocks of the given sizes, repeated until all is used."""
-    envelope = Envelope(values.size, detail)
+    """Run a Thinning over `values` in blocks of the given sizes, repeated until all is used."""
+    thinning = Thinning(values.size, detail)
     parts, start = [], 0
     while start < values.size:
         size = sizes[len(parts) % len(sizes)]
-        parts.append(envelope.process(values[start : start + size]))
+        parts.append(thinning.process(values[start : start + size]))
         start += size
-    parts.append(envelope.finish())
+    parts.append(thinning.finish())
     return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 N_BINS = 4000  # more than a screen has columns, so min and max per bin draw the same picture as every sample
 
 
-class Envelope:
+class Thinning:
     """Choose real samples of a stream so that no extreme is lost: argmin and argmax per bin, every sample of a window.
 
     Bins are counted from sample 0, so any division of the stream into blocks chooses the same samples. The first and
