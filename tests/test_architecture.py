@@ -25,16 +25,17 @@ ROOMS = {
     "metrics": set(),
     "allan": set(),
     "compensation": set(),
-    "models": set(),
+    "logs": set(),
+    "models": {"logs"},
     "fusion": set(),
     "sensors": {"models", "allan"},
     "runs": {"models", "fusion"},
     "scenario": {"models", "sensors", "fusion"},
     "report": {"pages", "metrics", "runs"},
     "recording": {"pages", "metrics", "runs"},
-    "judging": {"metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
+    "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
     "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording"},
-    "drift": {"compensation", "allan", "judging", "pages", "runs", "models"},
+    "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.
 TOP = {"reproduce": {"chain", "cli"}, "cli": set()}

@@ -24,23 +24,25 @@ Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="Run folder, or t
 Sources = Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Thermal cycles: run folders or text files.")]
 Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Trained model (JSON).")]
 Column = Annotated[str, typer.Option(help="Column of the rate, by name or number from 1 on.")]
-Unit = Annotated[str, typer.Option(help="Unit of the rate.")]
+Unit = Annotated[str | None, typer.Option(help="Unit of the rate; default that in the file, or deg/h.")]
 Temperature = Annotated[str, typer.Option(help="Column of the temperature.")]
-TemperatureUnit = Annotated[str, typer.Option(help="Unit of the temperature, degC or K.")]
+TemperatureUnit = Annotated[
+    str | None, typer.Option(help="Unit of the temperature; default that in the file, or degC.")
+]
 Rate = Annotated[str | None, typer.Option(help="Sample rate of a file, as 1 or '1 Hz'.")]
 Time = Annotated[str | None, typer.Option(help="Column of the time, instead of the sample rate.")]
-TimeUnit = Annotated[str, typer.Option(help="Unit of the time.")]
+TimeUnit = Annotated[str | None, typer.Option(help="Unit of the time; default that in the file, or s.")]
 Sensor = Annotated[str | None, typer.Option(help="Sensor of a run folder that has several with a thermometer.")]
 
 
 def _columns(
     column: str,
-    unit: str,
+    unit: str | None,
     temperature: str,
-    temperature_unit: str,
+    temperature_unit: str | None,
     rate: str | None,
     time: str | None,
-    time_unit: str,
+    time_unit: str | None,
     sensor: str | None,
 ) -> Columns:
     from testbed.drift.records import Columns
@@ -54,12 +56,12 @@ def train(
     out: Annotated[Path, typer.Option(help="Model file to write.")] = Path("drift_model.json"),
     method: Annotated[str, typer.Option(help="Kind of regression; see docs/compensation_models.md.")] = "gradient",
     column: Column = "rate",
-    unit: Unit = "deg/h",
+    unit: Unit = None,
     temperature: Temperature = "temperature",
-    temperature_unit: TemperatureUnit = "degC",
+    temperature_unit: TemperatureUnit = None,
     rate: Rate = None,
     time: Time = None,
-    time_unit: TimeUnit = "s",
+    time_unit: TimeUnit = None,
     sensor: Sensor = None,
 ) -> None:
     """Train a drift model on thermal cycles, for use on others."""
@@ -76,12 +78,12 @@ def apply(
     source: Source,
     out: Annotated[Path, typer.Option(help="Text file to write.")] = Path("compensated.csv"),
     column: Column = "rate",
-    unit: Unit = "deg/h",
+    unit: Unit = None,
     temperature: Temperature = "temperature",
-    temperature_unit: TemperatureUnit = "degC",
+    temperature_unit: TemperatureUnit = None,
     rate: Rate = None,
     time: Time = None,
-    time_unit: TimeUnit = "s",
+    time_unit: TimeUnit = None,
     sensor: Sensor = None,
 ) -> None:
     """Compensate a record with a trained model: time, rate, what was removed, and a flag outside the trained range."""
@@ -100,12 +102,12 @@ def audit(
     source: Source,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("runs/audit"),
     column: Column = "rate",
-    unit: Unit = "deg/h",
+    unit: Unit = None,
     temperature: Temperature = "temperature",
-    temperature_unit: TemperatureUnit = "degC",
+    temperature_unit: TemperatureUnit = None,
     rate: Rate = None,
     time: Time = None,
-    time_unit: TimeUnit = "s",
+    time_unit: TimeUnit = None,
     sensor: Sensor = None,
 ) -> None:
     """Find out what a compensation removes and how much true rate survives; status 1 if it leaks."""

@@ -121,6 +121,11 @@ class Clock:
         """Whether the samples lie on an even grid, lost ones aside."""
         return not (self.uneven.count or self.doubled.count or self.backward.count)
 
+    def said(self) -> str:
+        """Return the sample rate with its interval, for the reader."""
+        low, high = self.rate_limits_hz
+        return f"{self.rate_hz:.6g} Hz ({low:.6g} to {high:.6g})"
+
     def agrees_with(self, rate_hz: float) -> bool:
         """Return whether a nominal rate [Hz] may be the true one: to a tenth of a per cent, or within the interval."""
         return abs(rate_hz - self.rate_hz) <= max(1e-3 * self.rate_hz, 2.0 * _QUANTILE * self.rate_std_hz)
@@ -227,10 +232,10 @@ class ClockScan:
             self._quantum = int(np.gcd(self._quantum, np.gcd.reduce(np.abs(steps))))
         usual = self._usual if self._usual > 0.0 else 1.0
         count = np.rint(steps / usual).astype(np.int64)
-        over = steps - count * usual
+        over: FloatArray = steps - count * usual
         tolerance = TOLERANCE * usual + max(_rounding(self._quantum), self._resolution)
         far = np.abs(over) > tolerance
-        seconds = NANO * (stamps - steps - self._start)
+        seconds: FloatArray = (stamps - steps - self._start).astype(np.float64) * NANO
         kinds = (
             (self._backward, steps < 0),
             (self._doubled, steps == 0),
@@ -240,7 +245,9 @@ class ClockScan:
         for tally, chosen in kinds:
             if chosen.any():
                 found = np.flatnonzero(chosen)
-                tally.add(rows[found], seconds[found], NANO * steps[found], np.maximum(count[found] - 1, 0))
+                tally.add(
+                    rows[found], seconds[found], steps[found].astype(np.float64) * NANO, np.maximum(count[found] - 1, 0)
+                )
         self._weigh(steps, count, over, (steps > 0) & ~far & (count >= 1) & (count <= _ON_GRID))
 
     def _weigh(self, steps: Stamps, count: Stamps, over: FloatArray, good: NDArray[np.bool_]) -> None:

@@ -106,7 +106,9 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     content = [(number, text) for number, text in rest if not text.lstrip().startswith(COMMENTS)]
     if not content:
         raise refusal(path, "expected a column of numbers, got nothing")
-    separator, decimal = _marks(path, [text for _, text in content[-_SAMPLE:]], options)
+    # In a short file the last third: preamble and header stand above it.
+    tail = content[-min(_SAMPLE, -(-len(content) // 3)) :]
+    separator, decimal = _marks(path, [text for _, text in tail], options)
     rows = [(number, split(text, separator)) for number, text in content]
     return _parts(path, encoding, separator, decimal, rows, rest)
 
@@ -220,8 +222,8 @@ def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: 
         fractions = {cell for row in pairs for cell in row[1::2] if re.fullmatch(r"0\d+", cell)}
         header = next((row for row in rows if not any(_is_value(cell, ".") for cell in row)), None)
         if fractions or (header is not None and pairs and 2 * len(header) == len(pairs[-1])):
-            msg = f"{lines[-1][:40]!r} may be columns with commas between or numbers with a decimal comma: give --decimal , or --separator ,"
-            raise refusal(path, msg, key="--decimal")
+            what = "may be columns with commas between, or numbers with a decimal comma"
+            raise refusal(path, f"{lines[-1][:40]!r} {what}: give --decimal , or --separator ,", key="--decimal")
 
 
 def _parts(
@@ -233,7 +235,7 @@ def _parts(
     lines: list[tuple[int, str]],
 ) -> Dialect:
     """Return the dialect: where the rows begin, and what the lines above them are."""
-    tail = [row for _, row in rows[-_SAMPLE:]]
+    tail = [row for _, row in rows[-min(_SAMPLE, -(-len(rows) // 3)) :]]
     n_columns = Counter(map(len, tail)).most_common(1)[0][0]
     if n_columns > MOST_COLUMNS:
         raise refusal(path, f"expected at most {MOST_COLUMNS} columns, got {n_columns}: write one sample a row")

@@ -31,8 +31,8 @@ class FifoTable:
     Parameters
     ----------
     inner : Table
-        Rows with ``timestamp_sample`` or ``timestamp`` of the first sample [us], ``dt`` [us], ``scale``, ``samples`` and
-        the samples of each axis.
+        Rows with ``timestamp_sample`` or ``timestamp`` of the first sample [us], ``dt`` [us], ``scale``, ``samples``
+        and the samples of each axis.
     """
 
     def __init__(self, inner: Table) -> None:
@@ -67,9 +67,9 @@ class FifoTable:
         """Yield the wanted columns block by block, sample by sample."""
         first = len(self._sources)
         if all(i >= first for i in wanted):
-            places = {self._plain[i - first]: i for i in wanted}
-            for block in self._inner.blocks(list(places), [self._plain[i - first] for i in stamps]):
-                yield {places[i]: values for i, values in block.items()}
+            outer = {self._plain[i - first]: i for i in wanted}
+            for block in self._inner.blocks(list(outer), [self._plain[i - first] for i in stamps]):
+                yield {outer[i]: values for i, values in block.items()}
             return
         group = self._groups[self._sources[wanted[0]][0]]
         named = {i: self._sources[i][1] for i in wanted}

@@ -86,7 +86,8 @@ class Plan:
 
 def option_keys(field: str) -> str:
     """Return the option that a field of a channel's map has on the command line."""
-    return "--" + field.replace("time.column", "time").replace("time.unit", "time-unit").replace("time.rate", "rate")
+    names = {"time.column": "time", "time.unit": "time-unit", "time.rate": "rate", "time_unit": "time-unit"}
+    return f"--{names.get(field, field)}"
 
 
 def labels(table: Table) -> list[Label]:
@@ -161,6 +162,12 @@ def time_columns(table: Table, group: str) -> list[int]:
 def channels_of(table: Table) -> list[int]:
     """Return the columns that are no time."""
     return [i for i, label in enumerate(labels(table)) if label.quantity != "time"]
+
+
+def measured_quantity(table: Table, place: int) -> str:
+    """Return what a column measures by its own unit or the preamble's scale, or an empty text."""
+    label = labels(table)[place]
+    return label.quantity or ("rate" if _preamble_scale(table, label.name) else "")
 
 
 def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys) -> Plan:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
-from testbed.logs.clock import NANO, Clock, ClockScan, Event, Tally, grid_index, nanoseconds, resolution_ns
+from testbed.logs.channel import Channel, Log
+from testbed.logs.clock import NANO, Clock, ClockScan, nanoseconds, resolution_ns
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
+from testbed.logs.names import take_apart
 from testbed.logs.options import TextOptions, refusal
-from testbed.logs.plan import Plan, channels_of, option_keys, plan
+from testbed.logs.plan import Plan, channels_of, plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,119 +24,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from testbed.logs.table import Table
-    from testbed.signals import FloatArray
-
-# Places of the even grid that a recording may leave free, for each of its samples and at all.
-_MOST_FREE, _FREE_AT_ALL = 4, 1_000_000
-_TURN = 2.0 * np.pi
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A channel of a recording, in SI.
-
-    Parameters
-    ----------
-    name, label : str
-        Of the channel, and of its column with its file.
-    values : ndarray, shape (n_time,)
-        SI values, NaN where one is missing.
-    unit, quantity : str
-        As written in the file or map, and what it measures.
-    kind : str, optional
-        ``rate``, ``increment`` or ``angle``.
-    stamps_ns : ndarray, shape (n_time,), optional
-        Stamps [ns]; None if the sample rate is all that is known.
-    clock : Clock, optional
-        What they say.
-    rate_hz : float
-        Sample rate [Hz]: what was said, or what the stamps say.
-    notes : tuple of str
-        What was taken for granted, and what contradicts it.
-    table : Table
-        The file.
-    largest : float, optional
-        Range of the sensor [SI].
-    """
-
-    name: str
-    label: str
-    values: FloatArray
-    unit: str
-    quantity: str
-    kind: str | None
-    stamps_ns: NDArray[np.int64] | None
-    clock: Clock | None
-    rate_hz: float
-    notes: tuple[str, ...]
-    table: Table
-    largest: float | None = None
-
-    def even(self) -> FloatArray:
-        """Return the values on an even grid of `rate_hz`, NaN where samples are lost.
-
-        Raises
-        ------
-        ScenarioError
-            If the stamps are not even, with the first place and the option that takes them as even.
-        """
-        if self.stamps_ns is None or self.clock is None:
-            return self.values
-        refuse_uneven(self.table, self.clock)
-        index = grid_index(self.stamps_ns, self.clock)
-        n_grid = int(index[-1]) + 1
-        if n_grid == self.values.size:
-            return self.values
-        if n_grid > _MOST_FREE * self.values.size + _FREE_AT_ALL:
-            longest = max(self.clock.gaps.first, key=lambda gap: gap.length)
-            message = (
-                f"a gap of {longest.length:g} s leaves {n_grid} samples for {self.values.size}: cut the record in parts"
-            )
-            raise refusal(self.table.path, message, line=self.table.line(longest.row))
-        values = np.full(n_grid, np.nan)
-        values[index] = self.values
-        return values
-
-    def rate(self) -> Channel:
-        """Return the channel as an angular rate: increments over the sample period, differences of angles.
-
-        Raises
-        ------
-        ScenarioError
-            If it is neither, or the kind of an angle is not said.
-        """
-        if self.kind == "rate":
-            return self
-        if self.kind is None:
-            _refuse_kind(self)
-        values = self.even()
-        if self.kind == "angle":
-            values = np.diff(_unwound(values))
-        values = values * self.rate_hz
-        return replace(self, values=values, kind="rate", quantity="rate", stamps_ns=None)
-
-
-@dataclass(frozen=True)
-class Log:
-    """A recording.
-
-    Parameters
-    ----------
-    path : Path
-        Its file, or the map's.
-    channels : dict
-        Channels by name.
-    """
-
-    path: Path
-    channels: dict[str, Channel]
 
 
 def read_log(
     path: str | Path,
     map: LogMap | Mapping[str, Any] | str | Path | None = None,
 ) -> Log:
-    """Read a recording of any format that the testbed knows.
+    r"""Read a recording of any format that the testbed knows.
 
     Parameters
     ----------
@@ -217,8 +113,6 @@ def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
 
 def _short_names(plans: list[Plan]) -> list[Plan]:
     """Name channels after their columns without unit, where that is enough to tell them apart."""
-    from testbed.logs.names import take_apart
-
     short = [take_apart(one.name).name for one in plans]
     return [
         replace(one, name=name if short.count(name) == 1 else one.name) for one, name in zip(plans, short, strict=True)
@@ -236,7 +130,7 @@ def read_plans(plans: Sequence[Plan]) -> dict[str, Channel]:
     groups: dict[tuple[int, str], list[Plan]] = {}
     for one in plans:
         groups.setdefault((id(one.table), one.table.columns[one.value].group), []).append(one)
-    channels = {}
+    channels: dict[str, Channel] = {}
     for members in groups.values():
         channels.update(_read_group(members))
     return {one.name: channels[one.name] for one in plans}
@@ -331,7 +225,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Cl
     si = numbers if one.factor == 1.0 and one.zero == 0.0 else one.zero + one.factor * numbers
     return Channel(
         name=one.name,
-        label=f"{one.label} of {table.path}",
+        label=one.label,
         values=si,
         unit=one.unit,
         quantity=one.quantity,
@@ -346,69 +240,13 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Cl
 
 
 def _contradiction(one: Plan, clock: Clock) -> list[str]:
-    assert one.rate_hz is not None and one.stamps is not None
+    assert one.rate_hz is not None
+    assert one.stamps is not None
     name = one.table.columns[one.stamps].name
     if clock.agrees_with(one.rate_hz) or not clock.even:
         lost = f", in which {clock.gaps.missing} samples are missing" if clock.gaps.count else ""
         return [f"the stamps of {name!r}{lost} are not used: --time {name!r} does"] if lost else []
-    low, high = clock.rate_limits_hz
+    remedy = f"give --time {name!r} instead of --rate if they are right"
     return [
-        f"contradiction: the nominal rate is {one.rate_hz:g} Hz, the stamps of {name!r} say {clock.rate_hz:.6g} Hz "
-        f"({low:.6g} to {high:.6g}); give --time {name!r} instead of --rate if they are right"
+        f"contradiction: the nominal rate is {one.rate_hz:g} Hz, the stamps of {name!r} say {clock.said()}; {remedy}"
     ]
-
-
-def refuse_uneven(table: Table, clock: Clock) -> None:
-    """Refuse stamps that are not even, with the first place and the remedy.
-
-    Raises
-    ------
-    ScenarioError
-        If a stamp goes back or stands twice, or a step is no multiple of the usual one.
-    """
-    rate = f"--rate '{clock.mean_rate_hz:.6g} Hz'"
-    if clock.coarse:
-        message = (
-            f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, which is coarser than the samples "
-            f"({clock.doubled.count} stand twice or more): {rate} without --time takes them as even"
-        )
-        raise refusal(table.path, message, "--time")
-    for tally, what in (
-        (clock.backward, "stamps go back"),
-        (clock.doubled, "stamps stand twice"),
-        (clock.uneven, "steps are uneven"),
-    ):
-        if tally.count:
-            _refuse_event(table, clock, tally, what, rate)
-
-
-def _refuse_event(table: Table, clock: Clock, tally: Tally, what: str, rate: str) -> NoReturn:
-    event: Event = tally.first[0]
-    message = (
-        f"{tally.count} {what}; first {event.seconds:.9g} s from the start, where time goes on by {event.length:g} s and "
-        f"the usual step is {NANO * clock.step_ns:g} s; mend or remove the line, or take the samples as even with {rate} "
-        "instead of --time"
-    )
-    raise refusal(table.path, message, "--time", table.line(event.row))
-
-
-def _refuse_kind(channel: Channel) -> NoReturn:
-    path = channel.table.path
-    if channel.quantity == "angle":
-        message = f"{channel.unit!r} of {channel.label} is a unit of angle: say whether it is an increment or an angle"
-        raise refusal(path, message, "--kind")
-    if not channel.quantity:
-        raise refusal(path, f"expected the unit of {channel.label}, such as deg/s, or --scale of a count", "--unit")
-    message = f"expected a rate or an angle in {channel.label}, got {channel.quantity} in {channel.unit}"
-    raise refusal(path, message, option_keys("unit"))
-
-
-def _unwound(angle: FloatArray) -> FloatArray:
-    """Return an angle without the jumps of a whole turn that an encoder makes."""
-    steps = np.diff(angle)
-    if np.nanmax(np.abs(steps), initial=0.0) < 0.5 * _TURN:
-        return angle
-    known = np.isfinite(angle)
-    whole = angle.copy()
-    whole[known] = np.unwrap(angle[known])
-    return whole

@@ -141,11 +141,8 @@ def guard(path: Path, kind: str, claimed: int) -> None:
     """
     size = path.stat().st_size
     if claimed > _HARMLESS and claimed > _MOST_RATIO * size:
-        message = (
-            f"claims {claimed / 1e9:.3g} GB of data in {size / 1e6:.3g} MB ({kind}): damaged, or made to fill the memory; "
-            "write the columns needed to a new file"
-        )
-        raise refusal(path, message)
+        claim = f"claims {claimed / 1e9:.3g} GB of data in {size / 1e6:.3g} MB ({kind})"
+        raise refusal(path, f"{claim}: damaged, or made to fill the memory; write the columns needed to a new file")
 
 
 def _component(data: Any, n_axes: int, axis: int, i: int) -> Part:

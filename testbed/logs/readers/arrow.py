@@ -114,7 +114,7 @@ def _is_number(kind: Any) -> bool:
 
 def _unit(field: Any) -> str:
     found = {k.decode(errors="replace").lower(): v.decode(errors="replace") for k, v in (field.metadata or {}).items()}
-    return found.get("unit", found.get("units", ""))
+    return str(found.get("unit", found.get("units", "")))
 
 
 def _array(column: Any, stamp: bool) -> NDArray[Any]:
