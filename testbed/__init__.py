@@ -15,10 +15,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from testbed._version import __version__
-from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from testbed.chain.runner import run
+    from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.runs.folder import open_run
     from testbed.runs.results import Run
     from testbed.scenario.loader import load_scenario
@@ -38,8 +38,12 @@ __all__ = [
 ]
 
 _LAZY = {
+    "Problem": "testbed.errors",
     "Run": "testbed.runs.results",
+    "RunError": "testbed.errors",
     "Scenario": "testbed.scenario.model",
+    "ScenarioError": "testbed.errors",
+    "UnknownNameError": "testbed.errors",
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.runs.folder",
     "run": "testbed.chain.runner",
