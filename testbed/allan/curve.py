@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 _PER_DECADE = 10
-# Share of the samples of a mean that must be left.
-_LEAST = 0.8
+# Share of the usual number of samples that a mean must have, and of the differences that an averaging time must have.
+_LEAST, _LEAST_USED = 0.8, 0.02
 
 
 def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | None = None) -> AllanCurve:
@@ -25,8 +25,8 @@ def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | Non
     .. math:: \sigma^2(mT) = \frac{1}{2 (mT)^2 (n - 2m + 1)} \sum_k (\theta_{k+2m} - 2\theta_{k+m} + \theta_k)^2
 
     Where samples are lost, means of m samples stand for the differences of the angle, of those that are there if they
-    are at least 80 %. What the lost ones add to the variance of a mean is that of the single samples, and is taken
-    off; the degrees of freedom shrink by the share of the differences that are left.
+    are at least 80 % of their usual number. What the lost ones add to the variance of a mean is that of the single
+    samples, and is taken off; the degrees of freedom shrink by the share of the differences that are left.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | Non
     Raises
     ------
     ValueError
-        If the record is no vector of at least 4 samples, one is infinite, fewer than half are left, or a tau is under one
-        sample or over half the record.
+        If the record is no vector of at least 4 samples, one is infinite, fewer than half are left, or a tau is under
+        one sample or over half the record.
 
     References
     ----------
@@ -61,13 +61,14 @@ def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | Non
     record = record - np.nanmean(record)
     lost = np.isnan(record)
     angle = np.concatenate([[0.0], np.cumsum(_bridged(record, lost))])
+    used = None
     if lost.any():
         m, variance, used = _with_gaps(record, lost, m)
     else:
-        variance, used = np.array([_variance(angle, int(k)) for k in m]), np.ones(m.size)
+        variance = np.array([_variance(angle, int(k)) for k in m])
     exponents = [record_exponent(angle, int(k)) for k in m]
     full = np.array([equivalent_freedom(int(k), n_time + 1, int(a)) for k, a in zip(m, exponents, strict=True)])
-    edf = full * used
+    edf = full if used is None else full * used
     low, high = chi_square_limits(variance, edf)
     deviation = np.sqrt(variance)
     return AllanCurve(m / sample_rate_hz, deviation, np.sqrt(low), np.sqrt(high), edf, n_time, sample_rate_hz, used)
@@ -128,19 +129,22 @@ def _with_gaps(record: FloatArray, lost: NDArray[np.bool_], m: FloatArray) -> tu
     count = np.concatenate([[0], np.cumsum(~lost)])
     steps = np.diff(record)
     single = float(np.nanmean(steps**2)) / 2.0 if np.isfinite(steps).any() else 0.0
-    found = [(k, *_gap_variance(total, count, int(k), single)) for k in m]
-    kept = np.array([row for row in found if row[2] > 0.0 and row[1] > 0.0])
+    least = _LEAST * float(count[-1]) / record.size
+    found = [(k, *_gap_variance(total, count, int(k), single, least)) for k in m]
+    kept = np.array([row for row in found if row[2] > _LEAST_USED and row[1] > 0.0])
     if not kept.size:
         msg = "rate: expected samples beside each other, got gaps between all"
         raise ValueError(msg)
     return kept[:, 0], kept[:, 1], kept[:, 2]
 
 
-def _gap_variance(total: FloatArray, count: NDArray[np.int64], m: int, single: float) -> tuple[float, float]:
+def _gap_variance(
+    total: FloatArray, count: NDArray[np.int64], m: int, single: float, least: float
+) -> tuple[float, float]:
     """Return the Allan variance of means over what is left of m samples, and the share of the differences."""
     n = (count[m:] - count[:-m]).astype(np.float64)
     mean = (total[m:] - total[:-m]) / np.maximum(n, 1.0)
-    enough = n >= _LEAST * m
+    enough = n >= least * m
     both = enough[m:] & enough[:-m]
     if not both.any():
         return 0.0, 0.0

@@ -198,7 +198,8 @@ class _Problem:
                 f"{curve.deviation}"
             )
             raise ValueError(msg)
-        self._tau, self._n_time, self._used = curve.tau, curve.n_time, curve.used
+        self._tau, self._n_time = curve.tau, curve.n_time
+        self._used = 1.0 if curve.used is None else curve.used
         self._m = np.round(curve.tau * curve.sample_rate_hz)
         self._measured = curve.deviation**2
         self._columns = _columns(self._tau, self._m)

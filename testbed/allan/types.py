@@ -25,8 +25,8 @@ class AllanCurve:
         Number of samples of the record, lost ones counted.
     sample_rate_hz : float
         Its sample rate [Hz].
-    used : ndarray, shape (n_tau,)
-        Share of the second differences that lost samples left [-].
+    used : ndarray, shape (n_tau,), optional
+        Share of the second differences that lost samples left [-]; None: all.
     """
 
     tau: FloatArray
@@ -36,10 +36,10 @@ class AllanCurve:
     edf: FloatArray
     n_time: int
     sample_rate_hz: float
-    used: FloatArray
+    used: FloatArray | None = None
 
     def between(self, low: float, high: float) -> AllanCurve:
         """Return the part of the curve with `low` <= tau <= `high` [s]."""
         chosen = (self.tau >= low) & (self.tau <= high)
-        parts = {name: getattr(self, name)[chosen] for name in ("tau", "deviation", "lower", "upper", "edf", "used")}
-        return replace(self, **parts)
+        parts = {name: getattr(self, name)[chosen] for name in ("tau", "deviation", "lower", "upper", "edf")}
+        return replace(self, used=None if self.used is None else self.used[chosen], **parts)

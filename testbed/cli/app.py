@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from testbed.cli import compensate as cli_compensate
+from testbed.cli import log
 from testbed.cli.status import FAILED, MISSED, OK
 from testbed.errors import ScenarioError
 
@@ -20,6 +21,7 @@ app = typer.Typer(
 )
 
 app.add_typer(cli_compensate.app)
+app.add_typer(log.app)
 
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
@@ -107,26 +109,34 @@ def report(run_dir: RunDir) -> None:
 
 @app.command()
 def allan(
-    source: Annotated[Path, typer.Argument(metavar="FILE_OR_RUN", help="Text file with a rate record, or run folder.")],
-    column: Annotated[str | None, typer.Option(help="Column of a file by name, or by number from 1 on.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of the column, such as deg/s.")] = None,
-    rate: Annotated[str | None, typer.Option(metavar="HZ", help="Sample rate of a file.")] = None,
-    time: Annotated[str | None, typer.Option(help="Column of the time, instead of --rate.")] = None,
-    time_unit: Annotated[str, typer.Option(help="Unit of the time.")] = "s",
+    source: Annotated[Path, typer.Argument(metavar="FILE_OR_RUN", help="Recording of any format, or run folder.")],
+    column: log.Column = None,
+    unit: log.Unit = None,
+    scale: log.Scale = None,
+    kind: log.Kind = None,
+    rate: log.Rate = None,
+    time: log.Time = None,
+    time_unit: log.TimeUnit = None,
+    map_: log.Map = None,
+    separator: log.Separator = None,
+    decimal: log.Decimal = None,
+    encoding: log.Encoding = None,
+    skip: log.Skip = None,
     sensor: Annotated[str | None, typer.Option(help="Sensor of a run; default all.")] = None,
     min_tau: Annotated[float | None, typer.Option(metavar="S", help="Shortest averaging time of the fit.")] = None,
     max_tau: Annotated[float | None, typer.Option(metavar="S", help="Longest averaging time of the fit.")] = None,
     out: Annotated[Path | None, typer.Option(help="Plot (.svg, .png, .pdf); default allan_<name>.svg here.")] = None,
 ) -> None:
-    """Print the Allan coefficients of a record or of a run's sensors, and draw the deviation."""
+    """Print the Allan coefficients of recorded rates or of a run's sensors, and draw the deviation."""
     from testbed.cli.terminal import print_allan
     from testbed.judging.allan_analysis import allan_figure, analyse, figure_format, write_figure
     from testbed.judging.allan_records import read
 
     if out is not None:
         figure_format(out)
-    options = {"column": column, "unit": unit, "rate": rate, "time": time, "sensor": sensor}
-    analyses = [analyse(record, min_tau, max_tau) for record in read(source, time_unit=time_unit, **options)]
+    text = log.text_options(separator, decimal, encoding, skip)
+    wanted = log.selection(column, unit, scale, kind, rate, time, time_unit, map_, text)
+    analyses = [analyse(record, min_tau, max_tau) for record in read(source, wanted, sensor)]
     name = analyses[0].record.name if len(analyses) == 1 else source.resolve().name
     print_allan(analyses, write_figure(allan_figure(analyses), out or Path(f"allan_{name}.svg")))
 

@@ -96,7 +96,14 @@ def as_record(channel: Channel, name: str) -> Record:
         If its samples are not even.
     """
     values = channel.even()
-    return Record(name, values, channel.rate_hz, f"{channel.label} of {channel.table.path}", tuple(remarks(channel)), word_of(channel))
+    return Record(
+        name,
+        values,
+        channel.rate_hz,
+        f"{channel.label} of {channel.table.path}",
+        tuple(remarks(channel)),
+        word_of(channel),
+    )
 
 
 def read_run(folder: Path, sensor: str | None = None) -> list[Record]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 HEAD = 1 << 20
 MOST_COLUMNS = 10_000
 COMMENTS = ("#", "%", "//")
-_SAMPLE = 200
+_SAMPLE, _MANY = 200, 10
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 _WORDS = {"tab": "\t", "\\t": "\t", "blank": " ", "space": " "}
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
@@ -109,6 +109,7 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     # In a short file the last third: preamble and header stand above it.
     tail = content[-min(_SAMPLE, -(-len(content) // 3)) :]
     separator, decimal = _marks(path, [text for _, text in tail], options)
+    _refuse_two_readings(path, [text for _, text in [*content[:_SAMPLE], *tail]], separator, decimal, options)
     rows = [(number, split(text, separator)) for number, text in content]
     return _parts(path, encoding, separator, decimal, rows, rest)
 
@@ -183,8 +184,22 @@ def _marks(path: Path, lines: list[str], options: TextOptions) -> tuple[str, str
     share, _, _, _, separator, decimal = max(choices)
     if not share:
         raise refusal(path, f"expected a column of numbers, got {lines[-1][:60]!r}", line=None)
-    _refuse_two_readings(path, lines, separator, decimal, options)
+    if options.decimal is None:
+        _refuse_mixture(path, lines, share)
     return separator, decimal
+
+
+def _refuse_mixture(path: Path, lines: list[str], share: float) -> None:
+    """Refuse numbers with a decimal comma beside numbers with a point, if most fields are one or the other."""
+    for separator in list(_SEPARATORS)[1:]:
+        cells = [cell for line in lines for cell in split(line, separator)]
+        comma, point = (
+            sum(mark in cell and bool(pattern.fullmatch(cell)) for cell in cells)
+            for mark, pattern in ((",", _COMMA), (".", _POINT))
+        )
+        if comma and point and comma + point > (share + 0.2) * len(cells):
+            message = f"numbers with a decimal comma ({comma}) and with a point ({point})"
+            raise refusal(path, f"{message}: write all in one way", key="--decimal")
 
 
 def _share(lines: list[str], separator: str, decimal: str) -> tuple[float, int]:
@@ -202,16 +217,9 @@ def _is_value(cell: str, decimal: str) -> bool:
 
 
 def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: str, options: TextOptions) -> None:
-    """Refuse numbers such as 1,5 that may be two columns, and a mixture of 1,5 and 1.5."""
+    """Refuse numbers such as 1,5 that may be two columns."""
     rows = [split(line, separator) for line in lines]
     cells = [cell for row in rows for cell in row]
-    if separator != "," and options.decimal is None:
-        comma, point = (
-            sum(mark in cell and bool(p.fullmatch(cell)) for cell in cells)
-            for mark, p in ((",", _COMMA), (".", _POINT))
-        )
-        if comma and point:
-            raise refusal(path, f"numbers with a decimal comma ({comma}) and with a point ({point})", key="--decimal")
     if (
         separator == ","
         and options.separator is None
@@ -284,7 +292,7 @@ def _kind(cells: list[str], decimal: str) -> str:
     )
     for kind, matches in tests:
         # A single odd field among many is for the reader to find and to name with its line.
-        if sum(bool(matches(cell)) for cell in known) >= max(1, 0.9 * len(known)):
+        if sum(bool(matches(cell)) for cell in known) >= (0.9 if len(known) >= _MANY else 0.5) * len(known):
             integer = kind == "integer" and not all(matches(cell) for cell in known)
             return "number" if integer else kind
     return "text"

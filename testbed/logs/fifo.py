@@ -36,7 +36,7 @@ class FifoTable:
     """
 
     def __init__(self, inner: Table) -> None:
-        self._inner = inner
+        self.inner = inner
         self.path: Path = inner.path
         self.format = f"{inner.format}; several samples a row"
         self.header: Mapping[str, str] = inner.header
@@ -61,27 +61,27 @@ class FifoTable:
     @property
     def notes(self) -> Sequence[str]:
         """What was left out."""
-        return self._inner.notes
+        return self.inner.notes
 
     def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
         """Yield the wanted columns block by block, sample by sample."""
         first = len(self._sources)
         if all(i >= first for i in wanted):
             outer = {self._plain[i - first]: i for i in wanted}
-            for block in self._inner.blocks(list(outer), [self._plain[i - first] for i in stamps]):
+            for block in self.inner.blocks(list(outer), [self._plain[i - first] for i in stamps]):
                 yield {outer[i]: values for i, values in block.items()}
             return
         group = self._groups[self._sources[wanted[0]][0]]
         named = {i: self._sources[i][1] for i in wanted}
         places = [i for axis in named.values() for i in group["axes"].get(axis, [])]
         fixed = [group[key][0] for key in ("stamp", "dt", "scale")]
-        for block in self._inner.blocks(list(dict.fromkeys([*fixed, *group["samples"], *places])), [fixed[0]]):
+        for block in self.inner.blocks(list(dict.fromkeys([*fixed, *group["samples"], *places])), [fixed[0]]):
             yield {i: self._unrolled(block, group, axis) for i, axis in named.items()}
 
     def line(self, row: int) -> int | None:
         """Return the line of a sample's row."""
         n_samples = max(len(places) for places in next(iter(self._groups.values()))["axes"].values())
-        return self._inner.line(row // n_samples)
+        return self.inner.line(row // n_samples)
 
     def _unrolled(self, block: Block, group: dict[str, Any], axis: str) -> NDArray[Any]:
         n_samples = max(len(places) for places in group["axes"].values())

@@ -124,7 +124,7 @@ def find_column(table: Table, text: str, key: str, topic: str | None = None) -> 
         if found:
             where = ", ".join(f"{names[i]!r} (column {i + 1})" for i in found[:8])
             raise refusal(table.path, f"{text!r} is {len(found)} columns: {where}; give its number or topic", key)
-    if text.isdigit() and 1 <= int(text) <= len(names):
+    if re.fullmatch("[0-9]{1,9}", text) and 1 <= int(text) <= len(names):
         return int(text) - 1
     raise _unknown(table, text, key, names)
 

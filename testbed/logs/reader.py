@@ -82,7 +82,7 @@ def read_map(path: Path | None, found: LogMap | None) -> Log:
         assert path is not None
         table = open_table(path)
         plans = [plan(table.columns[i].name, ChannelMap(column=str(i + 1)), table) for i in channels_of(table)]
-        return Log(path, read_plans(_short_names(plans)))
+        return Log(path, read_plans(short_names(plans)))
     plans = plans_of(path, found)
     return Log(path or plans[0].table.path, read_plans(plans))
 
@@ -111,8 +111,8 @@ def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
     return plans
 
 
-def _short_names(plans: list[Plan]) -> list[Plan]:
-    """Name channels after their columns without unit, where that is enough to tell them apart."""
+def short_names(plans: list[Plan]) -> list[Plan]:
+    """Return plans named after their columns without unit, where that is enough to tell them apart."""
     short = [take_apart(one.name).name for one in plans]
     return [
         replace(one, name=name if short.count(name) == 1 else one.name) for one, name in zip(plans, short, strict=True)

@@ -10,8 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
-# Samples of a column of the outline, and samples that the word is looked for in.
-_STRIDE, _SAMPLE = 4096, 200_000
+# Rows of the outline beyond which pairs are joined, and samples that the word is looked for in.
+_ROWS, _SAMPLE = 8192, 200_000
 # A word is one if all differences are whole multiples of it to this part, up to so many words.
 _WHOLE, _MOST_WORDS = 0.05, 1e6
 # Share of equal neighbours, and word in steps, from which on values count as repeated.
@@ -88,7 +88,7 @@ class ValueScan:
         self._ends = {-1: (0, 0), 1: (0, 0)}
         self._last = np.nan
         self._sample: list[FloatArray] = []
-        self._outline: list[FloatArray] = []
+        self._outline, self._stride = np.empty((0, 2)), 1
 
     def add(self, values: FloatArray) -> None:
         """Take the next numbers, NaN where one is missing."""
@@ -106,8 +106,7 @@ class ValueScan:
         if sum(part.size for part in self._sample) < _SAMPLE:
             self._sample.append(known[:_SAMPLE])
         self._n_known += known.size
-        starts = np.arange(0, known.size, _STRIDE)
-        self._outline.append(np.stack([np.minimum.reduceat(known, starts), np.maximum.reduceat(known, starts)], axis=1))
+        self._draw(known)
 
     def result(self) -> Values:
         """Return what was found."""
@@ -134,7 +133,7 @@ class ValueScan:
             at_high=self._ends[1][0],
             row_low=self._ends[-1][1],
             row_high=self._ends[1][1],
-            outline=np.concatenate(self._outline) if self._outline else np.empty((0, 2)),
+            outline=self._outline,
         )
 
     def _pairs(self, values: FloatArray) -> None:
@@ -144,6 +143,17 @@ class ValueScan:
         self._n_equal += int(np.count_nonzero(steps == 0.0))
         self._pair_square += float(steps @ steps)
         self._last = float(values[-1])
+
+    def _draw(self, known: FloatArray) -> None:
+        """Add rows to the outline; when there are too many, join them in pairs."""
+        starts = np.arange(0, known.size, self._stride)
+        rows = np.stack([np.minimum.reduceat(known, starts), np.maximum.reduceat(known, starts)], axis=1)
+        outline = np.concatenate([self._outline, rows])
+        while len(outline) > _ROWS:
+            even = outline[: len(outline) // 2 * 2].reshape(-1, 2, 2)
+            outline = np.stack([even[:, :, 0].min(axis=1), even[:, :, 1].max(axis=1)], axis=1)
+            self._stride *= 2
+        self._outline = outline
 
     def _extremes(self, known: FloatArray) -> None:
         """Count the numbers at each end, and the most in a row; a run across two blocks counts as two."""

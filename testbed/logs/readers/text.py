@@ -136,15 +136,11 @@ class TextTable:
         try:
             return self._convert(content, types)
         except pa.ArrowInvalid as error:
-            cut = content.rstrip().rpartition(b"\n")
-            if last and not raw.endswith(b"\n") and cut[1]:
-                try:
-                    block = self._convert(cut[0], types)
-                except pa.ArrowInvalid:
-                    self._refuse_fault(raw, line, types, str(error))
-                self.notes = [f"the last line is cut short and was left out: {cut[2][:60].decode(errors='replace')!r}"]
-                return block
-            self._refuse_fault(raw, line, types, str(error))
+            rows, _, end = content.rstrip().rpartition(b"\n")
+            if not last or raw.endswith(b"\n") or line + raw.count(b"\n") <= self.dialect.skip + 1:
+                self._refuse_fault(raw, line, types, str(error))
+            self.notes = [f"the last line is cut short and was left out: {end[:60].decode(errors='replace')!r}"]
+            return self._parse(rows, types, line, raw + b"\n", last=True) if rows else {i: np.empty(0) for i in types}
 
     def _types(self, wanted: Sequence[int], stamps: Collection[int]) -> dict[int, Any]:
         """Return what each column is to become."""
