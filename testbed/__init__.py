@@ -19,8 +19,7 @@ from testbed._version import __version__
 if TYPE_CHECKING:
     from testbed.chain.runner import run
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
-    from testbed.runs.folder import open_run
-    from testbed.runs.results import Run
+    from testbed.notebook import Run, open_run
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
 
@@ -39,13 +38,13 @@ __all__ = [
 
 _LAZY = {
     "Problem": "testbed.errors",
-    "Run": "testbed.runs.results",
+    "Run": "testbed.notebook",
     "RunError": "testbed.errors",
     "Scenario": "testbed.scenario.model",
     "ScenarioError": "testbed.errors",
     "UnknownNameError": "testbed.errors",
     "load_scenario": "testbed.scenario.loader",
-    "open_run": "testbed.runs.folder",
+    "open_run": "testbed.notebook",
     "run": "testbed.chain.runner",
 }
 

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.compensation.record import Record
+from testbed.drift.columns import OPTIONS, Columns
 from testbed.errors import UnknownNameError
+from testbed.logs.choice import channel_map, time_map
 from testbed.logs.formats import open_table
 from testbed.logs.names import quantity_of
-from testbed.logs.options import frequency, refusal
+from testbed.logs.options import quantity, refusal
 from testbed.logs.plan import find_column, labels, option_keys, plan
 from testbed.logs.reader import read_plans
-from testbed.logs.selection import channel_map, time_map
 from testbed.units import CELSIUS, DEG_H
 
 if TYPE_CHECKING:
@@ -28,47 +29,6 @@ if TYPE_CHECKING:
     from testbed.logs.plan import Plan
     from testbed.logs.table import Table
     from testbed.signals import FloatArray
-
-# Of a text file, by the field of `Columns`.
-OPTIONS = {
-    "rate": "--column",
-    "rate_unit": "--unit",
-    "temperature": "--temperature",
-    "temperature_unit": "--temperature-unit",
-    "sample_rate": "--rate",
-    "time": "--time",
-    "time_unit": "--time-unit",
-}
-
-
-@dataclass(frozen=True)
-class Columns:
-    """How to read a text file; a run folder needs none of it but, where it has several such gyros, `sensor`.
-
-    Parameters
-    ----------
-    rate, temperature : str
-        Columns, by their name in the header or their number from 1 on.
-    rate_unit, temperature_unit : str, optional
-        Their units; those in the file if left out, or deg/h and degC where it says none.
-    sample_rate : str, optional
-        In hertz or with its unit, unless `time` is given.
-    time : str, optional
-        Column of the time.
-    time_unit : str, optional
-        Its unit; that in the file if left out, or seconds.
-    sensor : str, optional
-        Of a run folder.
-    """
-
-    rate: str = "rate"
-    temperature: str = "temperature"
-    rate_unit: str | None = None
-    temperature_unit: str | None = None
-    sample_rate: str | None = None
-    time: str | None = None
-    time_unit: str | None = None
-    sensor: str | None = None
 
 
 @dataclass(frozen=True)
@@ -174,9 +134,9 @@ def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     ScenarioError
         If it is no run folder, or has no such gyro or several.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     known = [name for name, signals in run.sensors.items() if "temperature" in signals]
     if sensor is not None and sensor not in known:
         raise refusal(folder, str(UnknownNameError("sensor with a thermometer", sensor, known)), "--sensor")
@@ -214,7 +174,11 @@ def read_file(path: Path, columns: Columns) -> ThermalRecord:
     if columns.sample_rate is not None and columns.time is not None:
         raise refusal(path, "expected either the sample rate (--rate) or the column of the time (--time), got both")
     table = open_table(path)
-    time = time_map(columns.time, columns.time_unit, frequency(columns.sample_rate) if columns.sample_rate else None)
+    time = time_map(
+        columns.time,
+        columns.time_unit,
+        quantity(columns.sample_rate, "Hz", "100 Hz", "--rate") if columns.sample_rate else None,
+    )
     plans = [
         _planned(table, "rate", columns.rate, columns.rate_unit, "deg/h", time),
         _planned(table, "temperature", columns.temperature, columns.temperature_unit, "degC", time),

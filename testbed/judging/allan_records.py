@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import UnknownNameError
+from testbed.logs.choice import select
 from testbed.logs.inspection import remarks, word_of
 from testbed.logs.options import refusal
-from testbed.logs.selection import Selection, select
+from testbed.logs.selection import Selection
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.logs.channel import Channel
+    from testbed.logs.selection import TextOptions
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 
@@ -49,7 +51,9 @@ class Record:
     word: float = 0.0
 
 
-def read(source: Path, wanted: Selection | None = None, sensor: str | None = None) -> list[Record]:
+def read(
+    source: Path, wanted: Selection | None = None, text: TextOptions | None = None, sensor: str | None = None
+) -> list[Record]:
     """Return the records that the command line asks for.
 
     Parameters
@@ -58,6 +62,8 @@ def read(source: Path, wanted: Selection | None = None, sensor: str | None = Non
         Recording or run folder.
     wanted : Selection, optional
         Which columns of a recording, and what they mean.
+    text : TextOptions, optional
+        How a text file is written.
     sensor : str, optional
         Of a run, as `read_run`.
 
@@ -68,7 +74,7 @@ def read(source: Path, wanted: Selection | None = None, sensor: str | None = Non
     """
     wanted = wanted or Selection()
     if source.is_dir():
-        given = ["--column"] * bool(wanted.columns) + ["--map"] * bool(wanted.map) + wanted.given
+        given = ["--column"] * bool(wanted.column) + ["--map"] * bool(wanted.map) + wanted.given
         if given:
             raise refusal(source, "expected a file with it; a run folder knows its signals", given[0])
         return read_run(source, sensor)
@@ -76,7 +82,7 @@ def read(source: Path, wanted: Selection | None = None, sensor: str | None = Non
         raise refusal(source, "expected a run folder with it", "--sensor")
     if not source.is_file():
         raise refusal(source, "expected a recording or a run folder, got neither")
-    channels = [channel.rate() for channel in select(source, wanted)]
+    channels = [channel.rate() for channel in select(source, wanted, text)]
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
@@ -128,10 +134,10 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     ScenarioError
         If it is no run folder, or the sensor is not in it or was never read.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
     from testbed.scenario.loader import load_scenario
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     scenario = load_scenario(folder / "scenario.yaml")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed.logs.names import clean_unit, quantity_of
-from testbed.logs.options import TextOptions, refusal
+from testbed.logs.options import refusal
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from testbed.logs.selection import TextOptions
 
 HEAD = 1 << 20
 MOST_COLUMNS = 10_000

@@ -7,12 +7,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from testbed.logs.fifo import FifoTable, has_rows_of_samples
-from testbed.logs.options import TextOptions, refusal
+from testbed.logs.options import refusal
 from testbed.logs.readers.text import TextTable
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from testbed.logs.selection import TextOptions
     from testbed.logs.table import Table
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -9,8 +9,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 
 from testbed import units
 from testbed.document import Document
-from testbed.logs.names import quantity_of, second
-from testbed.logs.options import frequency
+from testbed.logs.names import QUANTITIES, quantity_of, second
+from testbed.logs.options import quantity
 from testbed.parts import Part
 from testbed.units import Frequency
 
@@ -26,7 +26,7 @@ def _beside_map(path: Path, info: ValidationInfo) -> Path:
 
 def _plain_frequency(value: Any) -> Any:
     """Read a frequency in hertz or with its unit, as the option does."""
-    return frequency(value, "rate") if isinstance(value, str) else value
+    return quantity(value, "Hz", "100 Hz", "rate") if isinstance(value, str) else value
 
 
 Location = Annotated[Path, AfterValidator(_beside_map)]
@@ -92,7 +92,7 @@ class ChannelMap(Part):
         Largest value of the sensor with its unit, such as ``2000 deg/s``.
     """
 
-    column: Annotated[str, Field(min_length=1)]
+    column: str
     file: Location | None = None
     topic: str | None = None
     unit: str | None = None
@@ -176,11 +176,11 @@ def unit_quantity(unit: str) -> str:
     ValueError
         If it is no unit that a channel may have.
     """
-    quantity = quantity_of(unit)
-    if not quantity:
+    found = quantity_of(unit)
+    if not found:
         msg = f"{unit!r} is no unit of a channel; expected one such as 'deg/s', 'arcsec' or 'degC'"
         raise ValueError(msg)
-    return quantity
+    return found
 
 
 def measure(text: str) -> tuple[float, str]:
@@ -200,11 +200,5 @@ def measure(text: str) -> tuple[float, str]:
     if not unit.strip():
         msg = f"expected a number and a unit, such as '0.07 deg/s', got {text!r}: the unit is missing"
         raise ValueError(msg)
-    quantity = unit_quantity(unit.strip())
-    return value * units.parse(f"1 {unit}", {"temperature": "K"}.get(quantity, _si(quantity))), quantity
-
-
-def _si(quantity: str) -> str:
-    from testbed.logs.names import QUANTITIES
-
-    return QUANTITIES[quantity]
+    kind = unit_quantity(unit.strip())
+    return value * units.parse(f"1 {unit}", QUANTITIES[kind]), kind

@@ -1,9 +1,8 @@
-"""How a user says what a file does not: options of the command line, and the errors that name them."""
+"""Quantities that options give, and the errors that name the options."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed import units
@@ -13,35 +12,20 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@dataclass(frozen=True)
-class TextOptions:
-    """What is known of a text file beforehand; None: found in the file.
-
-    Parameters
-    ----------
-    separator : str, optional
-        ``,``, ``;``, ``|``, ``tab`` or ``blank``.
-    decimal : str, optional
-        ``.`` or ``,``.
-    encoding : str, optional
-        Such as ``utf-8``, ``utf-16``, ``cp1252``.
-    skip : int, optional
-        Lines to leave out before the header, or before the first row where there is none.
-    """
-
-    separator: str | None = None
-    decimal: str | None = None
-    encoding: str | None = None
-    skip: int | None = None
-
-
 def refusal(path: Path | str, message: str, key: str = "", line: int | None = None) -> ScenarioError:
     """Return the error that says what is wrong with `path`, at which option and line."""
     return ScenarioError([Problem(message, key=key, file=str(path), line=line)])
 
 
-def frequency(text: str, key: str = "--rate") -> float:
-    """Return the frequency [Hz] that `text` gives, with its unit or as a number in hertz.
+def quantity(text: str, si: str, example: str, key: str) -> float:
+    """Return the quantity above zero that `text` gives, with its unit or as a number in the unit `si`.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``100`` or ``2 kHz``.
+    si, example, key : str
+        SI unit of the result, a good text, and the option that gave it, for the message.
 
     Raises
     ------
@@ -49,33 +33,12 @@ def frequency(text: str, key: str = "--rate") -> float:
         If it is none above zero.
     """
     try:
-        value = float(text) if _is_number(text) else units.parse(text, "Hz", example="100 Hz")
+        value = float(text) if _is_number(text) else units.parse(text, si, example=example)
     except ValueError as error:
         raise ScenarioError([Problem(str(error), key=key)]) from error
     if not (value > 0.0 and math.isfinite(value)):
-        raise ScenarioError([Problem(f"expected more than 0 Hz, got {text}", key=key)])
+        raise ScenarioError([Problem(f"expected more than 0 {si}, got {text}", key=key)])
     return value
-
-
-def unit_factor(unit: str, si: str, example: str, key: str) -> float:
-    """Return what one `unit` is in the unit `si` [-].
-
-    Parameters
-    ----------
-    unit, si : str
-        Such as ``deg/s`` and ``rad/s``.
-    example, key : str
-        A good unit, and the option that gave it, for the message.
-
-    Raises
-    ------
-    ScenarioError
-        If it is no unit of that kind.
-    """
-    try:
-        return units.parse(f"1 {unit}", si, example=f"1 {example}")
-    except ValueError as error:
-        raise ScenarioError([Problem(str(error), key=key)]) from error
 
 
 def _is_number(text: str) -> bool:

@@ -11,7 +11,8 @@ from testbed import units
 from testbed.logs.clock import NANO
 from testbed.logs.logmap import ChannelMap, TimeMap, measure, time_factor
 from testbed.logs.names import QUANTITIES, Label, quantity_of, take_apart
-from testbed.logs.options import frequency, refusal
+from testbed.logs.options import quantity as as_quantity
+from testbed.logs.options import refusal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -285,7 +286,7 @@ def _header_rate(table: Table) -> float | None:
     for name, text in table.header.items():
         match = re.match(r"[\d.eE+]+( ?[kM]?Hz)?$", text.strip())
         if _RATES.fullmatch(name.strip()) and match:
-            return frequency(match[0], "--rate")
+            return as_quantity(match[0], "Hz", "100 Hz", "--rate")
     return None
 
 

@@ -15,8 +15,9 @@ from testbed.logs.clock import NANO, Clock, ClockScan, nanoseconds, resolution_n
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
 from testbed.logs.names import take_apart
-from testbed.logs.options import TextOptions, refusal
+from testbed.logs.options import refusal
 from testbed.logs.plan import Plan, channels_of, plan
+from testbed.logs.selection import TextOptions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,24 +1,43 @@
-"""Channels that the options of a command ask for, from a file or by a map."""
+"""What a user says of a recording: the options of every command that reads one. Imports here are light."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path  # noqa: TC003 - the command line reads the types of the fields
+from typing import Any
 
-from pydantic import ValidationError
 
-from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.logs.formats import open_table
-from testbed.logs.logmap import ChannelMap, TimeMap, load_map
-from testbed.logs.options import TextOptions, frequency, refusal
-from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan
-from testbed.logs.reader import read_map, read_plans
+def _words(name: str, text: str, metavar: str | None = None) -> dict[str, Any]:
+    return {"option": name, "help": text, "metavar": metavar}
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from testbed.logs.channel import Channel
-    from testbed.logs.table import Table
+@dataclass(frozen=True)
+class TextOptions:
+    """What is known of a text file beforehand; None: found in the file.
+
+    Parameters
+    ----------
+    separator : str, optional
+        ``,``, ``;``, ``|``, ``tab`` or ``blank``.
+    decimal : str, optional
+        ``.`` or ``,``.
+    encoding : str, optional
+        Such as ``utf-8``, ``utf-16``, ``cp1252``.
+    skip : int, optional
+        Lines to leave out before the header, or before the first row where there is none.
+    """
+
+    separator: str | None = field(
+        default=None,
+        metadata=_words("--separator", "Between the fields of a text: one of , ; | or the words tab and blank."),
+    )
+    decimal: str | None = field(
+        default=None, metadata=_words("--decimal", "Decimal mark of a text, a point or a comma.")
+    )
+    encoding: str | None = field(default=None, metadata=_words("--encoding", "Encoding of a text, such as cp1252."))
+    skip: int | None = field(
+        default=None, metadata=_words("--skip", "Lines of a text to leave out at its head.", "LINES")
+    )
 
 
 @dataclass(frozen=True)
@@ -27,138 +46,47 @@ class Selection:
 
     Parameters
     ----------
-    columns : tuple of str
-        By name or number; empty: all that are rates by their unit, or the only one.
+    column : list of str, optional
+        By name or number; left out: all that are rates by their unit, or the only one.
     unit, scale, kind : str, optional
         As in a map.
     rate, time, time_unit : str, optional
         Sample rate, in hertz or with its unit; column of the time, and its unit.
     map : Path, optional
-        The map, instead of all these but `columns`, which then are its channels.
-    text : TextOptions
-        How a text file is written.
+        The map, instead of all these but `column`, which then are its channels.
     """
 
-    columns: tuple[str, ...] = ()
-    unit: str | None = None
-    scale: str | None = None
-    kind: str | None = None
-    rate: str | None = None
-    time: str | None = None
-    time_unit: str | None = None
-    map: Path | None = None
-    text: TextOptions = field(default_factory=TextOptions)
+    column: list[str] | None = field(
+        default=None,
+        metadata=_words(
+            "--column", "Column by name, or by number from 1 on; may be given several times. Default: all rates."
+        ),
+    )
+    unit: str | None = field(
+        default=None, metadata=_words("--unit", "Unit of the column, such as deg/s; default that in the file.")
+    )
+    scale: str | None = field(
+        default=None, metadata=_words("--scale", "What a count is, instead of the unit, such as '0.07 deg/s'.")
+    )
+    kind: str | None = field(
+        default=None,
+        metadata=_words("--kind", "What the column is: rate, increment (angle since the sample before) or angle."),
+    )
+    rate: str | None = field(
+        default=None, metadata=_words("--rate", "Sample rate of even samples, instead of --time.", "FREQUENCY")
+    )
+    time: str | None = field(
+        default=None, metadata=_words("--time", "Column of the time; default the one whose name says so.")
+    )
+    time_unit: str | None = field(
+        default=None, metadata=_words("--time-unit", "Unit of the time; default that in the file, or s.")
+    )
+    map: Path | None = field(
+        default=None, metadata=_words("--map", "Map of the recording, instead of these.", "LOG.yaml")
+    )
 
     @property
     def given(self) -> list[str]:
         """The options of a single column that were given."""
-        return [
-            option_keys(name) for name in ("unit", "scale", "kind", "rate", "time", "time_unit") if getattr(self, name)
-        ]
-
-
-def select(path: Path, wanted: Selection) -> list[Channel]:
-    """Return the channels that the options of a command ask for.
-
-    Parameters
-    ----------
-    path : Path
-        The recording.
-    wanted : Selection
-        The options.
-
-    Returns
-    -------
-    list of Channel
-        In the order of the options, or of the file.
-
-    Raises
-    ------
-    ScenarioError
-        If something is missing, contradicts, is not understood or not in the file; with the option.
-    """
-    if wanted.map is not None:
-        return _mapped(path, wanted)
-    table = open_table(path, wanted.text)
-    rate_hz = frequency(wanted.rate) if wanted.rate else None
-    time = time_map(wanted.time, wanted.time_unit, None if wanted.time else rate_hz)
-    columns = wanted.columns or _rotations(table, wanted)
-    maps = [channel_map(column=c, unit=wanted.unit, scale=wanted.scale, kind=wanted.kind, time=time) for c in columns]
-    plans = [plan(one.column if wanted.columns else _name(table, one), one, table) for one in maps]
-    channels = list(read_plans(plans).values())
-    if rate_hz is not None and wanted.time is not None:
-        _refuse_contradiction(channels[0], rate_hz)
-    return channels
-
-
-def channel_map(**fields: Any) -> ChannelMap:
-    """Return the map of one channel made of options; ScenarioError names the option that is wrong."""
-    try:
-        return ChannelMap(**fields)
-    except ValidationError as error:
-        raise _as_options(error) from error
-
-
-def time_map(column: str | None, unit: str | None, rate_hz: float | None) -> TimeMap | None:
-    """Return the map of the time made of options, None for the file's own; ScenarioError names the wrong option."""
-    try:
-        return None if column is None and rate_hz is None else TimeMap(column=column, unit=unit, rate=rate_hz)
-    except ValidationError as error:
-        raise _as_options(error, "time.") from error
-
-
-def _as_options(error: ValidationError, prefix: str = "") -> ScenarioError:
-    problems = []
-    for detail in error.errors():
-        name = ".".join(map(str, detail["loc"])) or next((n for n in ("scale", "unit") if n in str(detail["msg"])), "")
-        text = str(detail["msg"]).removeprefix("Value error, ")
-        problems.append(Problem(text, key=option_keys(f"{prefix}{name or 'unit'}")))
-    return ScenarioError(problems)
-
-
-def _mapped(path: Path, wanted: Selection) -> list[Channel]:
-    assert wanted.map is not None
-    if wanted.given:
-        raise refusal(wanted.map, f"says this: leave out {', '.join(wanted.given)}", "--map")
-    channels = read_map(path, load_map(wanted.map)).channels
-    unknown = [name for name in wanted.columns if name not in channels]
-    if unknown:
-        raise refusal(wanted.map, str(UnknownNameError("channel", unknown[0], channels)), "--column")
-    if wanted.columns:
-        return [channels[name] for name in wanted.columns]
-    return [channel for channel in channels.values() if channel.quantity in ROTATIONS]
-
-
-def _rotations(table: Table, wanted: Selection) -> tuple[str, ...]:
-    """Return the numbers of the columns that are rates or angles by their unit, or of the only column."""
-    rest = channels_of(table)
-    if wanted.time is not None:
-        from testbed.logs.plan import find_column
-
-        rest = [i for i in rest if i != find_column(table, wanted.time, "--time")]
-    named = [i for i in rest if measured_quantity(table, i) in ROTATIONS]
-    # With increments and rates side by side, the rates are meant unless the kind is said.
-    rates = [i for i in named if (measured_quantity(table, i) == "rate") == (wanted.kind in {None, "rate"})]
-    found = rates or named or rest
-    if len(found) != 1 and not named:
-        names = [table.columns[i].name for i in found]
-        shown = (
-            ", ".join(name if name.startswith("column ") else repr(name) for name in names[:20]) or "several columns"
-        )
-        raise refusal(table.path, f"expected one of {shown}", "--column")
-    return tuple(str(i + 1) for i in found)
-
-
-def _name(table: Table, one: ChannelMap) -> str:
-    place = int(one.column) - 1
-    names = [label.name for label in labels(table)]
-    return names[place] if names.count(names[place]) == 1 else table.columns[place].name
-
-
-def _refuse_contradiction(channel: Channel, rate_hz: float) -> None:
-    clock = channel.clock
-    if clock is not None and not clock.agrees_with(rate_hz):
-        message = (
-            f"the nominal rate {rate_hz:g} Hz contradicts the stamps, which say {clock.said()}: leave out one of both"
-        )
-        raise refusal(channel.table.path, message, "--rate")
+        names = ("unit", "scale", "kind", "rate", "time", "time_unit")
+        return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]

@@ -23,7 +23,7 @@ def write(tmp_path, text, name="log.csv"):
 def read_file(path, *, column=None, sample_rate_hz=None, sensor=None, **options):
     rate = None if sample_rate_hz is None else str(sample_rate_hz)
     options = {"rate": rate, **options}
-    return read(path, Selection(columns=(column,) if column else (), **options), sensor)[0]
+    return read(path, Selection(column=[column] if column else None, **options), sensor=sensor)[0]
 
 
 @pytest.mark.parametrize(

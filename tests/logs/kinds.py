@@ -1,5 +1,6 @@
 """One record of known noise, written as loggers of many kinds write it."""
 
+# ruff: noqa: E501 - a table reads best with a kind a line
 from __future__ import annotations
 
 import numpy as np
@@ -39,7 +40,7 @@ ANGLE = np.cumsum(np.concatenate([[0.0], RATE / FS * 3600.0]))
 # Name: text, encoding, options beside the file.
 TEXTS = {
     "plain": (lines(SECONDS, DEG, head="t,rate [deg/s]\n"), "utf-8", {}),
-    "no header": (lines(SECONDS, DEG), "utf-8", {"columns": ("2",), "time": "1", "unit": "deg/s"}),
+    "no header": (lines(SECONDS, DEG), "utf-8", {"column": ["2"], "time": "1", "unit": "deg/s"}),
     "one column": (lines(DEG), "utf-8", {"rate": "1 kHz", "unit": "deg/s"}),
     "header behind a mark, epoch ns": (lines(STAMPS, DEG, head="#timestamp [ns],w_x [deg s^-1]\n"), "utf-8", {}),
     "epoch s": (lines(digits((EPOCH_NS / 1e3 + TIME_US) / 1e6, "{:.6f}"), DEG, head="stamp,w (deg/s)\n"), "utf-8", {}),
@@ -48,7 +49,7 @@ TEXTS = {
     "decimal comma, tabs": (lines(comma(SECONDS), comma(DEG), head="t\tw\n", separator="\t"), "utf-8", {"unit": "dps"}),
     "decimal comma alone": (lines(comma(DEG)), "utf-8", {"rate": "1000", "unit": "deg/s", "text": {"decimal": ","}}),
     "blanks": (lines([f"  {t}" for t in SECONDS], [f"   {d}  " for d in DEG], separator=" "), "utf-8",
-               {"columns": ("2",), "time": "1", "unit": "deg/s"}),
+               {"column": ["2"], "time": "1", "unit": "deg/s"}),
     "blanks after commas": (lines(list(map(str, TIME_US)), DEG, head="time (us), gyroADC[0] (deg/s)\n", separator=", "),
                             "utf-8", {}),
     "bars": (lines(SECONDS, DEG, head="time [s]|gyro [deg/s]\n", separator="|"), "utf-8", {}),
@@ -70,7 +71,7 @@ TEXTS = {
     "preamble": (
         lines([str(int(t) // 1000) for t in TIME_US], list(map(str, COUNTS)), list(map(str, COUNTS // 2)),
               head=f"CAMERA LOG\nversion,1.3\ntscale,0.001\ngscale,{np.deg2rad(0.002):.9g}\nt,gx,gy\n"),
-        "utf-8", {"columns": ("gx",)}),
+        "utf-8", {"column": ["gx"]}),
     "lines to skip": (
         lines(SECONDS, DEG, head="1,2\n3,4\nt,rate [deg/s]\n"), "utf-8", {"text": {"skip": 2}}),
     "counts": (lines(list(map(str, TIME_US)), list(map(str, COUNTS)), head="us,raw\n"), "utf-8", {"scale": "0.002 deg/s"}),

@@ -8,14 +8,16 @@ import pytest
 from testbed.errors import ScenarioError
 from testbed.judging.allan_analysis import analyse
 from testbed.judging.allan_records import read
-from testbed.logs.options import TextOptions
 from testbed.logs.readers.text import TextTable
-from testbed.logs.selection import Selection
+from testbed.logs.selection import Selection, TextOptions
 from tests.logs.kinds import COUNTS, DEG, FS, N_SHEET, RATE, SECONDS, TEXTS, lines
 
 
 def chosen(options):
-    return Selection(**{**options, "text": TextOptions(**options.get("text", {}))})
+    """Return what is said of the columns, and of the text."""
+    return Selection(**{key: value for key, value in options.items() if key != "text"}), TextOptions(
+        **options.get("text", {})
+    )
 
 
 @pytest.mark.oracle
@@ -24,7 +26,7 @@ def test_every_kind_of_text_gives_its_samples(tmp_path, kind):
     text, encoding, options = TEXTS[kind]
     path = tmp_path / "log.dat"
     path.write_bytes(text.encode(encoding))
-    (record,) = read(path, chosen(options))
+    (record,) = read(path, *chosen(options))
     expected = np.deg2rad(0.002 * COUNTS if kind in {"counts", "preamble"} else RATE)
     # Angles are differenced, and carry 12 digits of 1e3 arcsec at 1 kHz; all else is read as it was written.
     accuracy = 1e-11 / FS * 1e6 if kind == "angle" else 2e-9

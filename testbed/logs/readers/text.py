@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, find_dialect, split
-from testbed.logs.options import TextOptions, refusal
+from testbed.logs.options import refusal
+from testbed.logs.selection import TextOptions
 from testbed.logs.table import Column
 
 if TYPE_CHECKING:

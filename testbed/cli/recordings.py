@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table as Grid
@@ -25,9 +24,9 @@ _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 40
 
 
-def print_json(table: Table, reports: Sequence[Report], proposed: Proposal) -> None:
-    """Print what a recording holds as JSON."""
-    content = {
+def document(table: Table, reports: Sequence[Report], proposed: Proposal) -> dict[str, Any]:
+    """Return what a recording holds, for a program."""
+    return {
         "file": str(table.path),
         "format": table.format,
         "header": dict(table.header),
@@ -36,7 +35,6 @@ def print_json(table: Table, reports: Sequence[Report], proposed: Proposal) -> N
         "notes": list(table.notes),
         "map": map_data(proposed, str(table.path)),
     }
-    print(json.dumps(content, indent=2, allow_nan=False))  # noqa: T201 - this is the terminal
 
 
 def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -> None:
