@@ -29,11 +29,11 @@ from testbed.drift.leak import audit
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from testbed.sensors.fog import Fog
 
-DEG_H = np.pi / 180.0 / 3600.0
 EARTH = 10.6 * DEG_H
 FOG = load_preset("fog_paper3").model_copy(update={"sample_rate": 1.0})
 # Holds [s] and ramps (to degC, K/min) from 20 degC.

@@ -17,6 +17,8 @@ from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.metrics.spectra import WelchDensity, log_average
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
     from testbed.sensors.mhd_ars import MhdArs
     from testbed.signals import ComplexArray, FloatArray
 
-CLOCK_HZ = 20_000.0
-DEG = np.pi / 180.0
 CHANNELS = ("mems_gyro", "mhd_ars", "fused")
 # Volts per (deg/s) of the paper's fused output.
 PAPER_SCALE = 0.04
@@ -73,7 +73,7 @@ def switched_on(**parameters: Any) -> AllanSrkf:
     **parameters : Any
         Of the filter.
     """
-    clock = dict.fromkeys(CHANNELS[:2], CLOCK_HZ)
+    clock = dict.fromkeys(CHANNELS[:2], BASE_RATE_HZ)
     return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**parameters))
 
 
@@ -94,10 +94,10 @@ def read(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]
     dict of str to ndarray, shape (n_time,)
         ``mems_gyro``, ``mhd_ars`` and ``fused`` [rad/s].
     """
-    gyro = load_preset("crs03").model_copy(update={"sample_rate": CLOCK_HZ})
+    gyro = load_preset("crs03").model_copy(update={"sample_rate": BASE_RATE_HZ})
     readings = {
-        "mems_gyro": gyro.start(CLOCK_HZ, seed, "mems_gyro").process(rate),
-        "mhd_ars": load_preset("mhd03").start(CLOCK_HZ, seed, "mhd_ars").process(rate),
+        "mems_gyro": gyro.start(BASE_RATE_HZ, seed, "mems_gyro").process(rate),
+        "mhd_ars": load_preset("mhd03").start(BASE_RATE_HZ, seed, "mhd_ars").process(rate),
     }
     return readings | {"fused": stage.process(readings).rate}
 
@@ -129,10 +129,10 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
     list of float
         Fourier amplitudes over whole periods, in the order of `CHANNELS` [deg/s].
     """
-    first = round(protocol.settle * CLOCK_HZ)
+    first = round(protocol.settle * BASE_RATE_HZ)
     periods = np.ceil(protocol.observe * freq_hz - 1e-9)
-    n_time = first + round(periods / freq_hz * CLOCK_HZ)
-    turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / CLOCK_HZ
+    n_time = first + round(periods / freq_hz * BASE_RATE_HZ)
+    turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / BASE_RATE_HZ
     signals = read(amplitude * DEG * np.sin(turns), seed, stage)
     window = (1.0 - np.cos(turns[first:] / periods)) ** 2 / 1.5 if periods >= 3.0 else 1.0
     line = window * np.exp(-1j * turns[first:])
@@ -179,7 +179,7 @@ def settle_filter(seed: int, protocol: Protocol, **parameters: Any) -> Callable[
     """
     stage = switched_on(**parameters)
     for second in range(0, round(protocol.warm_up), 10):
-        read(np.zeros(round(min(10.0, protocol.warm_up - second) * CLOCK_HZ)), 1000 * seed - 1 - second, stage)
+        read(np.zeros(round(min(10.0, protocol.warm_up - second) * BASE_RATE_HZ)), 1000 * seed - 1 - second, stage)
     return lambda: copy.deepcopy(stage)
 
 
@@ -229,12 +229,12 @@ def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[Flo
     freq_hz, density : ndarray, shapes (n_bin,), (n_bin, 4)
         Frequency [Hz]; gyro, MHD ARS, fused, and MHD ARS referred to the rate by its response, two-sided [rad^2/s].
     """
-    n_time = round((protocol.warm_up + protocol.standstill) * CLOCK_HZ)
+    n_time = round((protocol.warm_up + protocol.standstill) * BASE_RATE_HZ)
     signals = read(np.zeros(n_time), seed, switched_on(**parameters))
     columns = []
     for name in CHANNELS:
-        welch = WelchDensity(CLOCK_HZ, round(CLOCK_HZ * min(4.0, protocol.standstill / 2.0)))
-        welch.process(signals[name][round(protocol.warm_up * CLOCK_HZ) :])
+        welch = WelchDensity(BASE_RATE_HZ, round(BASE_RATE_HZ * min(4.0, protocol.standstill / 2.0)))
+        welch.process(signals[name][round(protocol.warm_up * BASE_RATE_HZ) :])
         freq = welch.freq_hz[2:]  # what is below is the window's own leakage
         columns.append(welch.density[2:])
     columns.append(columns[1] / np.abs(mhd_response(freq)) ** 2)

@@ -17,7 +17,6 @@ from testbed.metrics.spectra import WelchDensity
 from testbed.reproduce import PAPERS, SEEDS, run_paper
 from testbed.reproduce.paper2 import (
     CHANNELS,
-    CLOCK_HZ,
     Protocol,
     _claims,
     amplitudes,
@@ -28,6 +27,7 @@ from testbed.reproduce.paper2 import (
     switched_on,
 )
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -163,7 +163,7 @@ def shares(freq: FloatArray) -> tuple[FloatArray, FloatArray]:
     |H|^2.
     """
     stage, A, K = settled_filter()
-    z = np.exp(2j * np.pi * freq / CLOCK_HZ)
+    z = np.exp(2j * np.pi * freq / BASE_RATE_HZ)
     to_rate = np.array([np.linalg.solve(one * np.eye(len(A)) - A, one * K)[0] for one in z]).T
     by = dict(zip(stage.model.sensors, to_rate, strict=True))
     own = 1e-14 / np.abs(mhd_response(freq)) ** 2
@@ -190,7 +190,7 @@ def test_measured_noise_is_within_a_decibel_of_the_mhd_ars() -> None:
     signals = read(np.zeros(60 * 20_000), 3, stage)
     density = []
     for name in ("fused", "mhd_ars"):
-        welch = WelchDensity(CLOCK_HZ, 20_000)
+        welch = WelchDensity(BASE_RATE_HZ, 20_000)
         welch.process(signals[name])
         density.append(welch.density)
     freq = welch.freq_hz

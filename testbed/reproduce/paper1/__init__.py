@@ -14,9 +14,9 @@ import numpy as np
 from testbed.judging.budget import signal_optima
 from testbed.metrics.errors import ErrorMetrics, floor_rmse
 from testbed.reproduce.paper1.defects import table_ii_defects
-from testbed.reproduce.paper1.runs import BASE_HZ, FILTERS, SIGNALS, Protocol, errors, outputs, presets, truth
+from testbed.reproduce.paper1.runs import FILTERS, SIGNALS, Protocol, errors, outputs, presets, truth
 from testbed.runs.atomic import write_text
-from testbed.signals import sample_times
+from testbed.signals import BASE_RATE_HZ, sample_times
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -126,10 +126,10 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
 
 def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tuple[float, float]]:
     """Return floor and optimum of each signal [deg/s], of its lines as they are in the truth after settle."""
-    sensors, first, lines = presets(), round(protocol.settle * BASE_HZ), []
+    sensors, first, lines = presets(), round(protocol.settle * BASE_RATE_HZ), []
     for signal, rate in rates.items():
         judged = ErrorMetrics([sine.frequency for sine in SIGNALS[signal]])
-        judged.add(sample_times(first, rate.size - first, BASE_HZ), rate[first:], rate[first:])
+        judged.add(sample_times(first, rate.size - first, BASE_RATE_HZ), rate[first:], rate[first:])
         lines.append(judged.truth_lines())
     floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
     best = signal_optima(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()}, lines)

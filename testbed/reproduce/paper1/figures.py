@@ -24,8 +24,9 @@ from testbed.reproduce.drawing import (
     smooth,
 )
 from testbed.reproduce.paper1.data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
-from testbed.reproduce.paper1.runs import DEG, FILTERS, SENSORS
+from testbed.reproduce.paper1.runs import FILTERS, SENSORS
 from testbed.runs.atomic import write_text
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
