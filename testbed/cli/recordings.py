@@ -14,7 +14,7 @@ from testbed.logs.proposal import map_data
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from testbed.logs.clock import Clock
+    from testbed.logs.clock import TimeBase
     from testbed.logs.inspection import Report
     from testbed.logs.proposal import Proposal
     from testbed.logs.table import Table
@@ -58,7 +58,7 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
         out.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
-def _clocks(reports: Sequence[Report]) -> dict[str, Clock]:
+def _clocks(reports: Sequence[Report]) -> dict[str, TimeBase]:
     found = {}
     for report in reports:
         if report.clock is not None and report.plan.stamps is not None:
@@ -66,7 +66,7 @@ def _clocks(reports: Sequence[Report]) -> dict[str, Clock]:
     return found
 
 
-def _time(clock: Clock) -> str:
+def _time(clock: TimeBase) -> str:
     span = 1e-9 * (clock.end_ns - clock.start_ns)
     parts = [f"{clock.said()}, {clock.n_time} samples in {span:.9g} s"]
     parts.append(f"steps {1e-9 * clock.step_ns:.6g} s with a standard deviation of {1e-9 * clock.step_std_ns:.2g} s")

@@ -17,7 +17,7 @@ from testbed.logs.selection import Selection
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from testbed.logs.channel import Channel
+    from testbed.logs.channel import LogChannel
     from testbed.logs.selection import TextOptions
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
@@ -86,12 +86,12 @@ def read(
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
-def as_record(channel: Channel, name: str) -> Record:
+def as_record(channel: LogChannel, name: str) -> Record:
     """Return a channel of a recording as a record: on an even grid, lost samples NaN.
 
     Parameters
     ----------
-    channel : Channel
+    channel : LogChannel
         A rate.
     name : str
         For titles and file names.

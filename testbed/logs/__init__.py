@@ -6,12 +6,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from testbed.logs.channel import Channel, Log
+    from testbed.logs.channel import Log, LogChannel
     from testbed.logs.reader import read_log
 
-__all__ = ["Channel", "Log", "read_log"]
+__all__ = ["Log", "LogChannel", "read_log"]
 
-_LAZY = {"Channel": "testbed.logs.channel", "Log": "testbed.logs.channel", "read_log": "testbed.logs.reader"}
+_LAZY = {"LogChannel": "testbed.logs.channel", "Log": "testbed.logs.channel", "read_log": "testbed.logs.reader"}
 
 
 def __getattr__(name: str) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from testbed.logs.clock import NANO, Clock, Event, Tally, grid_index
+from testbed.logs.clock import NANO, Event, Tally, TimeBase, grid_index
 from testbed.logs.options import refusal
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True)
-class Channel:
+class LogChannel:
     """A channel of a recording, in SI.
 
     Parameters
@@ -40,7 +40,7 @@ class Channel:
         ``rate``, ``increment`` or ``angle``.
     stamps_ns : ndarray, shape (n_time,), optional
         Stamps [ns]; None if the sample rate is all that is known.
-    clock : Clock, optional
+    clock : TimeBase, optional
         What they say.
     rate_hz : float
         Sample rate [Hz]: what was said, or what the stamps say.
@@ -59,7 +59,7 @@ class Channel:
     quantity: str
     kind: str | None
     stamps_ns: NDArray[np.int64] | None
-    clock: Clock | None
+    clock: TimeBase | None
     rate_hz: float
     notes: tuple[str, ...]
     table: Table
@@ -117,7 +117,7 @@ class Channel:
             raise refusal(self.table.path, message, line=self.table.line(row))
         return values
 
-    def rate(self) -> Channel:
+    def rate(self) -> LogChannel:
         """Return the channel as an angular rate: increments over the sample period, differences of angles.
 
         Raises
@@ -149,10 +149,10 @@ class Log:
     """
 
     path: Path
-    channels: dict[str, Channel]
+    channels: dict[str, LogChannel]
 
 
-def refuse_uneven(table: Table, clock: Clock) -> None:
+def refuse_uneven(table: Table, clock: TimeBase) -> None:
     """Refuse stamps that are not even, with the first place and the remedy.
 
     Raises
@@ -176,7 +176,7 @@ def refuse_uneven(table: Table, clock: Clock) -> None:
             _refuse_event(table, clock, tally, what, rate)
 
 
-def _refuse_event(table: Table, clock: Clock, tally: Tally, what: str, rate: str) -> NoReturn:
+def _refuse_event(table: Table, clock: TimeBase, tally: Tally, what: str, rate: str) -> NoReturn:
     event: Event = tally.first[0]
     step = NANO * clock.step_ns
     place = f"{event.seconds:.9g} s from the start, where time goes on by {event.length:g} s, usually by {step:g} s"
@@ -184,7 +184,7 @@ def _refuse_event(table: Table, clock: Clock, tally: Tally, what: str, rate: str
     raise refusal(table.path, f"{tally.count} {what}; first {place}; {remedy}", "--time", table.line(event.row))
 
 
-def _refuse_kind(channel: Channel) -> NoReturn:
+def _refuse_kind(channel: LogChannel) -> NoReturn:
     path = channel.table.path
     if channel.quantity == "angle":
         message = f"{channel.unit} of {channel.label} is a unit of angle: expected increment or angle"

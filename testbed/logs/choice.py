@@ -16,12 +16,12 @@ from testbed.logs.reader import read_map, read_plans
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from testbed.logs.channel import Channel
+    from testbed.logs.channel import LogChannel
     from testbed.logs.selection import Selection, TextOptions
     from testbed.logs.table import Table
 
 
-def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> list[Channel]:
+def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> list[LogChannel]:
     """Return the channels that the options of a command ask for.
 
     Parameters
@@ -35,7 +35,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
 
     Returns
     -------
-    list of Channel
+    list of LogChannel
         In the order of the options, or of the file.
 
     Raises
@@ -82,7 +82,7 @@ def _as_options(error: ValidationError, prefix: str = "") -> ScenarioError:
     return ScenarioError(problems)
 
 
-def _mapped(path: Path, wanted: Selection) -> list[Channel]:
+def _mapped(path: Path, wanted: Selection) -> list[LogChannel]:
     assert wanted.map is not None
     if wanted.given:
         raise refusal(wanted.map, f"says this: leave out {', '.join(wanted.given)}", "--map")
@@ -121,7 +121,7 @@ def _name(table: Table, one: ChannelMap) -> str:
     return names[place] if names.count(names[place]) == 1 else table.columns[place].name
 
 
-def _refuse_contradiction(channel: Channel, rate_hz: float) -> None:
+def _refuse_contradiction(channel: LogChannel, rate_hz: float) -> None:
     clock = channel.clock
     if clock is not None and not clock.agrees_with(rate_hz):
         message = (

@@ -59,7 +59,7 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeBase:
     """What the stamps of a recording say.
 
     Parameters
@@ -181,7 +181,7 @@ class ClockScan:
         self._last = int(stamps[-1])
         return stamps
 
-    def result(self) -> Clock:
+    def result(self) -> TimeBase:
         """Return what was found."""
         step = self._length / self._n_samples if self._n_samples else self._usual
         variance = covariance = 0.0
@@ -197,7 +197,7 @@ class ClockScan:
         quantum = max(_rounding(self._quantum), round(self._resolution), 1)
         spread = np.sqrt(wander + ends + (quantum if quantum > 1 else 0) ** 2 / 6.0) / max(self._n_samples, 1)
         rate_std = float(spread / step / (NANO * step)) if step > 0.0 else float("nan")
-        return Clock(
+        return TimeBase(
             n_time=self._n_time,
             start_ns=self._start,
             end_ns=self._last,
@@ -279,7 +279,7 @@ def usual_step(steps: Stamps) -> float:
     return float(forward[(forward >= 0.5 * median) & (forward <= 1.5 * median)].mean())
 
 
-def grid_index(stamps: Stamps, clock: Clock) -> NDArray[np.int64]:
+def grid_index(stamps: Stamps, clock: TimeBase) -> NDArray[np.int64]:
     """Return the place of each sample on the even grid, shape (n_time,), from 0; lost samples leave places free."""
     counts = np.maximum(np.rint(np.diff(stamps) / clock.step_ns), 1).astype(np.int64)
     index: NDArray[np.int64] = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)])

@@ -112,7 +112,7 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     tail = content[-min(_SAMPLE, -(-len(content) // 3)) :]
     separator, decimal = _marks(path, [text for _, text in tail], options)
     _refuse_two_readings(path, [text for _, text in [*content[:_SAMPLE], *tail]], separator, decimal, options)
-    rows = [(number, split(text, separator)) for number, text in content]
+    rows = [(number, fields_of(text, separator)) for number, text in content]
     return _parts(path, encoding, separator, decimal, rows, rest)
 
 
@@ -146,7 +146,7 @@ def find_encoding(path: Path, head: bytes) -> str:
     return "utf-8"
 
 
-def split(text: str, separator: str) -> list[str]:
+def fields_of(text: str, separator: str) -> list[str]:
     """Return the fields of a line without the blanks around them."""
     if separator == " ":
         return re.sub(r"\s+(?=[\[(])", "\0", text.strip()).split()
@@ -194,7 +194,7 @@ def _marks(path: Path, lines: list[str], options: TextOptions) -> tuple[str, str
 def _refuse_mixture(path: Path, lines: list[str], share: float) -> None:
     """Refuse numbers with a decimal comma beside numbers with a point, if most fields are one or the other."""
     for separator in list(_SEPARATORS)[1:]:
-        cells = [cell for line in lines for cell in split(line, separator)]
+        cells = [cell for line in lines for cell in fields_of(line, separator)]
         comma, point = (
             sum(mark in cell and bool(pattern.fullmatch(cell)) for cell in cells)
             for mark, pattern in ((",", _COMMA), (".", _POINT))
@@ -206,7 +206,7 @@ def _refuse_mixture(path: Path, lines: list[str], share: float) -> None:
 
 def _share(lines: list[str], separator: str, decimal: str) -> tuple[float, int]:
     """Return the share of fields that are numbers or times, and the usual number of fields."""
-    rows = [split(line, separator) for line in lines]
+    rows = [fields_of(line, separator) for line in lines]
     n_columns = Counter(map(len, rows)).most_common(1)[0][0]
     cells = [cell for row in rows if len(row) == n_columns for cell in row]
     good = sum(_is_value(cell, decimal) for cell in cells)
@@ -220,7 +220,7 @@ def _is_value(cell: str, decimal: str) -> bool:
 
 def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: str, options: TextOptions) -> None:
     """Refuse numbers such as 1,5 that may be two columns."""
-    rows = [split(line, separator) for line in lines]
+    rows = [fields_of(line, separator) for line in lines]
     cells = [cell for row in rows for cell in row]
     if (
         separator == ","
@@ -333,7 +333,7 @@ def _commented(lines: list[tuple[int, str]], first: int, separator: str, n_named
         (number, text.strip()) for number, text in lines if number < first and text.lstrip().startswith(COMMENTS)
     ]
     for number, text in comments[-1:]:
-        names = split(text.lstrip("#%/").strip(), separator)
+        names = fields_of(text.lstrip("#%/").strip(), separator)
         words = n_named == 1 and " " in names[0]
         if len(names) == n_named and not words and not all(_is_value(name, ".") for name in names):
             return names, number

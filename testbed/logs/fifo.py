@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -47,13 +47,13 @@ class FifoTable:
             for axis, places in group["axes"].items()
             for i in places
         }
-        self.columns: list[Column] = []
+        self.columns: list[TableColumn] = []
         self._sources: list[tuple[str, str]] = []
         for group, found in self._groups.items():
             prefix = f"{group}/" if group else ""
             unit = "rad/s" if "gyro" in group else ""
             for axis in ("timestamp_sample", *found["axes"]):
-                self.columns.append(Column(f"{prefix}{axis}", "ns" if axis == "timestamp_sample" else unit, group))
+                self.columns.append(TableColumn(f"{prefix}{axis}", "ns" if axis == "timestamp_sample" else unit, group))
                 self._sources.append((group, axis))
         self._plain = [i for i, c in enumerate(inner.columns) if c.group not in self._groups]
         self.columns += [inner.columns[i] for i in self._plain]

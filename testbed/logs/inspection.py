@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.clock import NANO, Clock, ClockScan, Tally, resolution_ns
+from testbed.logs.clock import NANO, ClockScan, Tally, TimeBase, resolution_ns
 from testbed.logs.reader import stamps_of, wrap_of
 from testbed.logs.values import Values, ValueScan, word_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from testbed.logs.channel import Channel
+    from testbed.logs.channel import LogChannel
     from testbed.logs.plan import Plan
     from testbed.logs.table import Table
 
@@ -48,7 +48,7 @@ class Report:
         How it is read.
     values : Values
         Its numbers, in the unit of the file.
-    clock : Clock, optional
+    clock : TimeBase, optional
         Its time base, where there are stamps.
     findings : tuple of Finding
         What is wrong or odd.
@@ -56,7 +56,7 @@ class Report:
 
     plan: Plan
     values: Values
-    clock: Clock | None
+    clock: TimeBase | None
     findings: tuple[Finding, ...]
 
 
@@ -104,17 +104,17 @@ def _inspect_group(plans: Sequence[Plan]) -> Iterator[tuple[Plan, Report]]:
     for one, scan in zip(plans, scans, strict=True):
         clock = clocks[one.stamps, one.time_unit].result() if one.stamps is not None and clocks else None
         values = scan.result()
-        yield one, Report(one, values, clock, tuple(findings(table, clock, values, one)))
+        yield one, Report(one, values, clock, tuple(channel_findings(table, clock, values, one)))
 
 
-def findings(table: Table, clock: Clock | None, values: Values, one: Plan) -> Iterator[Finding]:
+def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: Plan) -> Iterator[Finding]:
     """Yield what is wrong or odd with a channel.
 
     Parameters
     ----------
     table : Table
         Its file.
-    clock : Clock, optional
+    clock : TimeBase, optional
         Its time base.
     values : Values
         Its numbers.
@@ -141,7 +141,7 @@ def findings(table: Table, clock: Clock | None, values: Values, one: Plan) -> It
         )
 
 
-def _of_time(table: Table, clock: Clock) -> Iterator[Finding]:
+def _of_time(table: Table, clock: TimeBase) -> Iterator[Finding]:
     if clock.coarse:
         rounded = f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, coarser than the samples"
         yield Finding("coarse", f"{rounded}; --rate '{clock.mean_rate_hz:.6g} Hz' takes them as even")
@@ -161,14 +161,14 @@ def _of_time(table: Table, clock: Clock) -> Iterator[Finding]:
         )
 
 
-def gap_text(table: Table, clock: Clock) -> str:
+def gap_text(table: Table, clock: TimeBase) -> str:
     """Return how many samples are lost, where, and which share of all.
 
     Parameters
     ----------
     table : Table
         For the lines.
-    clock : Clock
+    clock : TimeBase
         With at least one gap.
     """
     lost = clock.gaps.missing
@@ -188,12 +188,12 @@ def _places(table: Table, tally: Tally) -> str:
     return f"at {', '.join(places)}{more}"
 
 
-def remarks(channel: Channel) -> list[str]:
+def remarks(channel: LogChannel) -> list[str]:
     """Return what a user of a channel should know: what was taken for granted, contradicts, is missing or rounded.
 
     Parameters
     ----------
-    channel : Channel
+    channel : LogChannel
         Of a recording.
     """
     said = list(channel.notes)
@@ -204,7 +204,7 @@ def remarks(channel: Channel) -> list[str]:
     return said
 
 
-def word_of(channel: Channel) -> float:
+def word_of(channel: LogChannel) -> float:
     """Return the word that a channel's values are multiples of [SI], 0 if there is none."""
     known = channel.values[np.isfinite(channel.values)][:200_000]
     return word_size(known)
@@ -230,7 +230,7 @@ def report_data(report: Report) -> dict[str, Any]:
     }
 
 
-def _clock_data(clock: Clock | None, one: Plan) -> dict[str, Any]:
+def _clock_data(clock: TimeBase | None, one: Plan) -> dict[str, Any]:
     if clock is None:
         return {"rate_hz": one.rate_hz, "column": None}
     low, high = clock.rate_limits_hz

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
-from testbed.logs.channel import Channel, Log
-from testbed.logs.clock import NANO, Clock, ClockScan, nanoseconds, resolution_ns
+from testbed.logs.channel import Log, LogChannel
+from testbed.logs.clock import NANO, ClockScan, TimeBase, nanoseconds, resolution_ns
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
 from testbed.logs.names import take_apart
@@ -120,7 +120,7 @@ def short_names(plans: list[Plan]) -> list[Plan]:
     ]
 
 
-def read_plans(plans: Sequence[Plan]) -> dict[str, Channel]:
+def read_plans(plans: Sequence[Plan]) -> dict[str, LogChannel]:
     """Read channels, those of one group of a file in one pass.
 
     Raises
@@ -131,16 +131,16 @@ def read_plans(plans: Sequence[Plan]) -> dict[str, Channel]:
     groups: dict[tuple[int, str], list[Plan]] = {}
     for one in plans:
         groups.setdefault((id(one.table), one.table.columns[one.value].group), []).append(one)
-    channels: dict[str, Channel] = {}
+    channels: dict[str, LogChannel] = {}
     for members in groups.values():
         channels.update(_read_group(members))
     return {one.name: channels[one.name] for one in plans}
 
 
-def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, Channel]]:
+def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
     table = plans[0].table
     scans = {(one.stamps, one.time_unit): None for one in plans if one.stamps is not None}
-    clocks: dict[tuple[int | None, float], tuple[NDArray[np.int64], Clock]] = {}
+    clocks: dict[tuple[int | None, float], tuple[NDArray[np.int64], TimeBase]] = {}
     columns = _columns(table, plans)
     for stamps, unit in scans:
         assert stamps is not None
@@ -170,7 +170,7 @@ def _columns(table: Table, plans: Sequence[Plan]) -> dict[int, NDArray[Any]]:
     return columns
 
 
-def scan_clock(table: Table, values: NDArray[Any], column: int, unit_s: float) -> tuple[NDArray[np.int64], Clock]:
+def scan_clock(table: Table, values: NDArray[Any], column: int, unit_s: float) -> tuple[NDArray[np.int64], TimeBase]:
     """Return the stamps of a whole column [ns], a counter's turns added, and what they say.
 
     Raises
@@ -208,7 +208,7 @@ def wrap_of(values: NDArray[Any], unit_s: float) -> int:
     return round(turn) if small and turn < float(1 << 62) else 0
 
 
-def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Clock] | None) -> Channel:
+def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], TimeBase] | None) -> LogChannel:
     table = one.table
     numbers = values.astype(np.float64) if values.dtype.kind != "f" or values.dtype.itemsize != 8 else values
     infinite = np.isinf(numbers)
@@ -224,7 +224,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Cl
         stamps, clock = None, None
     rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
     si = numbers if one.factor == 1.0 and one.zero == 0.0 else one.zero + one.factor * numbers
-    return Channel(
+    return LogChannel(
         name=one.name,
         label=one.label,
         values=si,
@@ -240,7 +240,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Cl
     )
 
 
-def _contradiction(one: Plan, clock: Clock) -> list[str]:
+def _contradiction(one: Plan, clock: TimeBase) -> list[str]:
     assert one.rate_hz is not None
     assert one.stamps is not None
     name = one.table.columns[one.stamps].name

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column that a file holds.
 
     Parameters
@@ -65,7 +65,7 @@ class Table(Protocol):
         ...
 
     @property
-    def columns(self) -> Sequence[Column]:
+    def columns(self) -> Sequence[TableColumn]:
         """What it holds."""
         ...
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.logs.options import refusal
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -37,7 +37,7 @@ class ArrayTable:
         The file.
     format : str
         What it is.
-    columns : list of Column
+    columns : list of TableColumn
         What it holds.
     parts : list of callable
         One for each column: from first and last row to the numbers.
@@ -49,12 +49,12 @@ class ArrayTable:
 
     path: Path
     format: str
-    columns: list[Column] = field(default_factory=list)
+    columns: list[TableColumn] = field(default_factory=list)
     parts: list[Part] = field(default_factory=list)
     header: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, column: Column, part: Part) -> None:
+    def add(self, column: TableColumn, part: Part) -> None:
         """Add a column; ScenarioError if there are too many."""
         if len(self.columns) >= MOST_COLUMNS:
             message = f"expected at most {MOST_COLUMNS} columns ({self.format}): write one sample a row"
@@ -62,12 +62,12 @@ class ArrayTable:
         self.columns.append(column)
         self.parts.append(part)
 
-    def add_array(self, column: Column, data: Any) -> None:
+    def add_array(self, column: TableColumn, data: Any) -> None:
         """Add an array: one column, one for each component of a sample, or one for each field of a record.
 
         Parameters
         ----------
-        column : Column
+        column : TableColumn
             Name, unit and group.
         data : array_like
             Has `shape`, `dtype` and slices; the longer of two dimensions is the time.
@@ -78,7 +78,7 @@ class ArrayTable:
                 if dtype[name].kind in "iufbM" and not dtype[name].shape:
                     label = f"{column.name}/{name}" if column.name else name
                     part = lambda i, k, name=name: data[i:k][name]
-                    self.add(Column(label, "", column.name or column.group, shape[0]), part)
+                    self.add(TableColumn(label, "", column.name or column.group, shape[0]), part)
             return
         if dtype.kind not in "iufbM" or len(shape) > 2 or not shape:
             return
@@ -90,7 +90,7 @@ class ArrayTable:
             return
         for i in range(n_parts):
             name = column.name if n_parts == 1 else f"{column.name}[{i}]" if column.name else f"column {i + 1}"
-            single = Column(name or "column 1", column.unit, column.group, shape[axis], column.rate_hz, column.start_ns)
+            single = replace(column, name=name or "column 1", n_time=shape[axis])
             self.add(single, _component(data, len(shape), axis, i))
 
     def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:

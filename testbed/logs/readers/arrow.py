@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import MOST_COLUMNS, exact, guard
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -50,7 +50,7 @@ class ArrowTable:
         if len(schema) > MOST_COLUMNS:
             raise refusal(path, f"expected at most {MOST_COLUMNS} columns, got {len(schema)}: write one sample a row")
         self._names = [field.name for field in schema if _is_number(field.type)]
-        self.columns = [Column(name, _unit(schema.field(name)), "", n_time) for name in self._names]
+        self.columns = [TableColumn(name, _unit(schema.field(name)), "", n_time) for name in self._names]
         self.header = {
             k.decode(errors="replace"): v.decode(errors="replace") for k, v in (schema.metadata or {}).items()
         }

@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import ArrayTable
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,7 +58,7 @@ def _add(table: ArrayTable, name: str, data: Any) -> None:
         return
     table.header.update(_words(data, f"{name}."))
     unit = next((_text(data.attrs[key]) for key in _UNITS if key in data.attrs), "")
-    table.add_array(Column(name, unit, name.rpartition("/")[0]), _Scaled(data))
+    table.add_array(TableColumn(name, unit, name.rpartition("/")[0]), _Scaled(data))
 
 
 class _Scaled:

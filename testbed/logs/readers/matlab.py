@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import ArrayTable, guard
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,4 +79,4 @@ def _add(table: ArrayTable, name: str, value: Any, group: str) -> None:
     elif array.size == 1 and array.dtype.kind in "iufU":
         table.header[name.rpartition("/")[2]] = str(array.item())
     else:
-        table.add_array(Column(name, "", group), array)
+        table.add_array(TableColumn(name, "", group), array)

@@ -9,7 +9,7 @@ import numpy as np
 
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import ArrayTable, guard
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,7 +28,7 @@ def open_npy(path: Path) -> ArrayTable:
     except (OSError, ValueError, EOFError) as error:
         raise refusal(path, f"cannot be read (npy): {error}; is the file cut?") from error
     table = ArrayTable(path, "npy")
-    table.add_array(Column(""), data)
+    table.add_array(TableColumn(""), data)
     return table
 
 
@@ -57,7 +57,7 @@ def _add(table: ArrayTable, name: str, data: Any) -> None:
     if data.size == 1:
         table.header[name] = str(data.item())
     else:
-        table.add_array(Column(name), data)
+        table.add_array(TableColumn(name), data)
 
 
 def open_netcdf3(path: Path) -> ArrayTable:
@@ -83,6 +83,6 @@ def open_netcdf3(path: Path) -> ArrayTable:
         else:
             native = data.astype(data.dtype.newbyteorder("="))
             table.add_array(
-                Column(name, unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)), native
+                TableColumn(name, unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)), native
             )
     return table

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, find_dialect, split
+from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, fields_of, find_dialect
 from testbed.logs.options import refusal
 from testbed.logs.selection import TextOptions
-from testbed.logs.table import Column
+from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -88,11 +88,11 @@ class TextTable:
             row -= 1
         return None
 
-    def _columns(self) -> list[Column]:
+    def _columns(self) -> list[TableColumn]:
         dialect = self.dialect
         names = dialect.names or tuple(f"column {i + 1}" for i in range(len(dialect.kinds)))
         units = dialect.units or ("",) * len(names)
-        return [Column(name, unit) for name, unit in zip(names, units, strict=True)]
+        return [TableColumn(name, unit) for name, unit in zip(names, units, strict=True)]
 
     def _raw(self) -> Iterator[tuple[bytes, bool]]:
         """Yield blocks of whole lines in UTF-8, and whether it is the last."""
@@ -186,7 +186,7 @@ class TextTable:
         with self.path.open(encoding=self.dialect.encoding, errors="replace") as stream:
             for line, text in enumerate(stream, 1):
                 if line > self.dialect.skip and text.strip() and not text.lstrip().startswith(COMMENTS):
-                    yield line, split(text.rstrip("\r\n"), self.dialect.separator)
+                    yield line, fields_of(text.rstrip("\r\n"), self.dialect.separator)
 
     def _refuse_fault(self, raw: bytes, line: int, types: dict[int, Any], reason: str) -> NoReturn:
         """Find the first row that is not like the others, and refuse it with its line."""
@@ -194,7 +194,7 @@ class TextTable:
         for number, text in enumerate(raw.decode(errors="replace").split("\n"), line):
             if number <= dialect.skip or not text.strip() or text.lstrip().startswith(COMMENTS):
                 continue
-            fields = split(text.rstrip("\r"), dialect.separator)
+            fields = fields_of(text.rstrip("\r"), dialect.separator)
             if len(fields) != dialect.n_columns:
                 self._refuse(
                     f"expected {dialect.n_columns} fields ({dialect}), got {len(fields)}: {text.strip()[:60]!r}; "

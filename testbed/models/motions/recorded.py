@@ -24,7 +24,7 @@ from testbed.parts import Part
 if TYPE_CHECKING:
     from typing import Self
 
-    from testbed.logs.channel import Channel
+    from testbed.logs.channel import LogChannel
     from testbed.signals import FloatArray
 
 _JITTER = 1e-3
@@ -143,7 +143,7 @@ class Recorded(Motion):
         return content
 
 
-def _refuse_jitter(channel: Channel) -> None:
+def _refuse_jitter(channel: LogChannel) -> None:
     """Refuse steps that differ by more than a spline bears and the rounding of the stamps explains."""
     assert channel.clock is not None
     assert channel.stamps_ns is not None
