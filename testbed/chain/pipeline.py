@@ -11,6 +11,7 @@ from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
 from testbed.scenario.step_choice import choose_step, exposed
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
-# Samples: a second at 20 kHz.
-_BLOCK = 20_000
 
 
 class Chain:
@@ -112,7 +111,7 @@ def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Ite
         Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
+    step = BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 
