@@ -14,7 +14,7 @@ ComplexArray = NDArray[np.complex128]
 
 # Base clock of a run, unless all its sensors are content with less.
 BASE_RATE_HZ = 20_000.0
-# Samples of a block unless told otherwise: a second of that clock.
+# Samples worked on at a time: a second of the base clock.
 BLOCK = 20_000
 
 

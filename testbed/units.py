@@ -28,7 +28,7 @@ from testbed.errors import quoted
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
-DEG = math.pi / 180.0  # rad
+DEG = math.radians(1.0)  # rad
 DEG_H = DEG / 3600.0  # rad/s
 CELSIUS = 273.15  # K, 0 degC
 

@@ -10,11 +10,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from testbed.allan import allan_deviation, fit_allan
 from testbed.allan.fit import judge_fit
-from testbed.compensation.training import block_means
+from testbed.compensation import training
 
 if TYPE_CHECKING:
-    from testbed.allan.fit import AllanFit
-    from testbed.allan.types import AllanCurve
+    from testbed.allan import AllanCurve, AllanFit
     from testbed.signals import FloatArray
 
 BLOCK = 100.0  # s, of the block means
@@ -102,23 +101,25 @@ def block_std(rate: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> 
     block : float, optional
         Length of a block [s].
     """
-    return float(block_means(rate, block_samples(sample_rate_hz, block)).std())
+    return float(timed_means(rate, sample_rate_hz, block).std())
 
 
-def block_samples(sample_rate_hz: float, block: float = BLOCK) -> int:
-    """Return how many samples a block has, one at the least.
+def timed_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> FloatArray:
+    """Return the means over blocks, shape (n_block,), an incomplete last block left out.
 
     Parameters
     ----------
+    values : ndarray, shape (n_time,)
+        Samples, any unit.
     sample_rate_hz : float
         [Hz].
     block : float, optional
         Length of a block [s].
     """
-    return max(1, round(block * sample_rate_hz))
+    return training.block_means(values, max(1, round(block * sample_rate_hz)))
 
 
-def low_pass(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:
+def smoothed(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:
     r"""Return the record through a zero-phase low-pass, twice a second-order Butterworth filter, -3 dB at `bandwidth`.
 
     The two passes have the gain :math:`1 / (1 + (f/f_c)^4)`, so :math:`f_c = f_{3dB} (\sqrt{2} - 1)^{-1/4}`.

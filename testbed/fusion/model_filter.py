@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
-
 Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
 
 FORMS = {"conventional": CONVENTIONAL, "joseph": JOSEPH, "square_root": SQUARE_ROOT}

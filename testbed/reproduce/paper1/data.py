@@ -12,7 +12,7 @@ import numpy as np
 
 from testbed.fusion.belief import default_belief
 from testbed.models.mhd_channel.channel import MhdChannel, one_mode_response
-from testbed.reproduce.paper1.runs import SIGNALS, Protocol, fuse, presets, read
+from testbed.reproduce.paper1.runs import SIGNALS, FusionProtocol, fuse, presets, sensor_readings
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import DEG
 
@@ -131,7 +131,7 @@ def _step(sensor: Sensor, freq_hz: float, seed: int) -> tuple[complex, float]:
     return complex(in_phase, quadrature) / DEG, 0.5 * float(np.mean(np.diff(readings[first:]) ** 2))
 
 
-def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) -> dict[str, Table]:
+def following(rate: FloatArray, signal: str, protocol: FusionProtocol, seed: int = 1) -> dict[str, Table]:
     """Return the three tables of one signal's run: `rates` and `fused` over two periods (mixed: one), `adaptation` over
     the whole run.
 
@@ -145,13 +145,13 @@ def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) 
         True rate [rad/s].
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of the run.
     seed : int
         Seed of the noise.
     """
     sensors = presets()
-    readings = read(rate, seed, sensors)
+    readings = sensor_readings(rate, seed, sensors)
     blocks = fuse(readings, sensors)
     lines = [sine.frequency for sine in SIGNALS[signal]]
     length = min(2.0 / min(lines), 20.0 / max(lines))

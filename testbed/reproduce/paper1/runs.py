@@ -40,7 +40,7 @@ SIGNALS = {
 
 
 @dataclass(frozen=True)
-class Protocol:
+class FusionProtocol:
     """Times of a run [s]: its length, and where the metrics start.
 
     Parameters
@@ -58,14 +58,14 @@ def presets() -> dict[str, Sensor]:
     return {name: load_preset(preset) for name, preset in SENSORS.items()}
 
 
-def truth(signal: str, protocol: Protocol) -> FloatArray:
+def truth(signal: str, protocol: FusionProtocol) -> FloatArray:
     """Return the inertial rate of the table under its servo [rad/s], shape (n_time,), at 20 kHz.
 
     Parameters
     ----------
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Its length.
     """
     terms = [sine.start(protocol.duration, random_stream(0, "motion")) for sine in SIGNALS[signal]]
@@ -74,7 +74,7 @@ def truth(signal: str, protocol: Protocol) -> FloatArray:
     return np.concatenate([table.process(motion.process(round(BASE_RATE_HZ))).rate for _ in range(seconds)])
 
 
-def read(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
+def sensor_readings(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
     """Return the readings of the sensors [rad/s], each at its own rate.
 
     Parameters
@@ -105,12 +105,12 @@ def fuse(readings: Mapping[str, FloatArray], sensors: Mapping[str, Sensor]) -> d
 
 def outputs(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
     """Return the rates [rad/s] of the sensors and of the filters, each at its own rate; arguments as `read`."""
-    readings = read(rate, seed, sensors)
+    readings = sensor_readings(rate, seed, sensors)
     return readings | {name: block.rate for name, block in fuse(readings, sensors).items()}
 
 
 def errors(
-    found: Mapping[str, FloatArray], rate: FloatArray, signal: str, protocol: Protocol
+    found: Mapping[str, FloatArray], rate: FloatArray, signal: str, protocol: FusionProtocol
 ) -> dict[str, tuple[float, float]]:
     """Return complex and aligned RMSE [deg/s] of every rate.
 
@@ -122,7 +122,7 @@ def errors(
         True rate at 20 kHz [rad/s].
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Its times.
     """
     lines = [sine.frequency for sine in SIGNALS[signal]]

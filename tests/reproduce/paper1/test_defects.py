@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from testbed.reproduce.paper1.defects import CASES, Split, sensors_of, split
-from testbed.reproduce.paper1.runs import Protocol
+from testbed.reproduce.paper1.runs import FusionProtocol
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import DEG
 
-PROTOCOL = Protocol(duration=8.0, settle=6.0)
+PROTOCOL = FusionProtocol(duration=8.0, settle=6.0)
 
 
 def sine(freq_hz: float) -> np.ndarray:
