@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from testbed.chain.runner import run
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
+    from testbed.logs import read_log
     from testbed.models.motions import list_motions
     from testbed.notebook import Run, open_run
     from testbed.scenario.beliefs import belief_of
@@ -102,6 +103,7 @@ __all__ = [
     "load_preset",
     "load_scenario",
     "open_run",
+    "read_log",
     "run",
 ]
 
@@ -122,6 +124,7 @@ _LAZY = {
     "load_preset": "testbed.sensors",
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
+    "read_log": "testbed.logs",
     "run": "testbed.chain.runner",
 }
 

@@ -30,6 +30,7 @@ EXAMPLES = [
     "testbed.errors",
     "testbed.fusion",
     "testbed.fusion.belief",
+    "testbed.logs.reader",
     "testbed.models.mhd_channel.channel",
     "testbed.models.motions",
     "testbed.models.turntable.turntable",
@@ -77,6 +78,8 @@ def test_an_unknown_name_is_an_attribute_error():
 def test_every_public_function_can_be_called_with_every_package_imported(tmp_path):
     path = short_file(tmp_path, ("duration: 0.5 s", "duration: 0.3 s"))
     run = testbed.run(path, out=tmp_path / "run")
+    log = tmp_path / "log.csv"
+    log.write_text("t [ms],gyro [deg/s]\n" + "".join(f"{k},{k % 2}\n" for k in range(100)))
     rates = {name: signals.sample_rate_hz for name, signals in run.sensors.items()}
     readings = {name: signals.rate for name, signals in run.sensors.items()}
     called = {
@@ -90,6 +93,7 @@ def test_every_public_function_can_be_called_with_every_package_imported(tmp_pat
         "list_motions": testbed.list_motions(),
         "list_presets": testbed.list_presets(),
         "list_sensors": testbed.list_sensors(),
+        "read_log": testbed.read_log(log),
     }
     assert sorted(called) == FUNCTIONS
     assert isinstance(called["open_run"], testbed.Run)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from testbed.models.motion import MotionProfile
 from testbed.models.turntable.modal import check_modal
 from testbed.models.turntable.servo import required_torque
 from testbed.models.turntable.turntable import Turntable
-from testbed.signals import BASE_RATE_HZ, BLOCK, random_stream
+from testbed.signals import BASE_RATE_HZ, BLOCK
 
 if TYPE_CHECKING:
     from testbed.models.turntable.turntable import TruthBlock, TurntableParameters
@@ -186,8 +185,7 @@ class _Excerpts:
         self._scenario = scenario
         self._n_time = min(_EXCERPT, scenario.n_time)
         # A floor moves on its own: whatever it does, it does under both.
-        stream = partial(random_stream, scenario.frame.seed, "turntable", "floor")
-        self._floor = scenario.turntable.floor.start(self._n_time / BASE_RATE_HZ, stream)
+        self._floor = scenario.floor(self._n_time / BASE_RATE_HZ)
         places, self._scale = _hardest(scenario)
         last = scenario.n_time - self._n_time
         starts = sorted({min(max(k - self._n_time // 2, 0), last) for k in places})
