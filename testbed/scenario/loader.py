@@ -44,6 +44,12 @@ def load_scenario(path: str | Path) -> Scenario:
     ------
     ScenarioError
         With every finding at once: file, line, key and what was expected.
+
+    Examples
+    --------
+    >>> load_scenario("no.yaml")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: no.yaml: cannot be read: No such file or directory
     """
     return read_document(Document(Path(path)), Path(path).resolve().parent)
 
