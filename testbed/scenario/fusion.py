@@ -76,7 +76,16 @@ class Fusion:
         parameters = entry if model is None else self.document.validate(model, entry, key, self.folder)
         if parameters is None or belief is None:
             return None
-        return FilterSpec(kind, factory, parameters, belief)
+        return FilterSpec(kind, factory, parameters, self._without_rounding(belief))
+
+    def _without_rounding(self, belief: Mapping[str, SensorBelief]) -> dict[str, SensorBelief]:
+        """Return the belief without a step of the readings for sensors without noise: they do not round, and rightly
+        repeat themselves at rest.
+        """
+        silent = {name for name, sensor in self.sensors.items() if not sensor.noise}
+        return {
+            name: one.model_copy(update={"resolution": None}) if name in silent else one for name, one in belief.items()
+        }
 
     def _at_rest(self, model: Any, entry: Mapping[str, Any]) -> dict[str, str]:
         """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at

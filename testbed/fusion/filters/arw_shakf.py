@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from testbed.fusion.bands import Bands, load_bands
-from testbed.fusion.base import Rows
+from testbed.fusion.base import Rows, Switch
 from testbed.fusion.filters.shakf import SageHusa, SageHusaParameters
 from testbed.units import DEG, PositiveDuration
 
@@ -71,6 +71,7 @@ class ArwShakfLiteralParameters(ArwShakfParameters):
 
     default_q: ClassVar[dict[int, float]] = {1: 0.3 * DEG**2}
 
+    gate: Switch = False
     use_input_noise: bool = False
     bands: NamedBands = _DEFAULT_AT_ONCE
     memory: PositiveDuration | None = None
