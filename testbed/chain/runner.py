@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from contextlib import ExitStack
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from testbed._version import __version__
 from testbed.chain.interrupt import held_interrupts
 from testbed.chain.pipeline import simulate
+from testbed.errors import quoted
 from testbed.judging.judge import Judge
 from testbed.runs.folder import RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
 from testbed.runs.netcdf import NetcdfStore
 from testbed.runs.results import MemoryStore, Run, assemble
+from testbed.scenario.model import MOST_SEED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,8 +66,11 @@ def run(
     ScenarioError
         If `out` cannot be written or holds something else.
     """
-    if block is not None and not block > 0.0:
-        msg = f"block: expected more than 0 s, got {block!r}"
+    if block is not None and not 0.0 < block < math.inf:
+        msg = f"block: expected more than 0 s, and finite, got {block!r}"
+        raise ValueError(msg)
+    if seed is not None and not 0 <= seed <= MOST_SEED:
+        msg = f"seed: expected 0 to {MOST_SEED}, got {quoted(seed)}"
         raise ValueError(msg)
     scenario = scenario if seed is None else scenario.with_seed(seed)
     if out is None:
@@ -79,7 +86,7 @@ def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress |
         judge.write(part)
         if progress is not None:
             progress((part.start + part.n_time) / chain.rates["base"])
-    return assemble(memory.groups(), {**judge.metrics(), "versions": versions()})
+    return assemble(memory.groups(), {**judge.metrics(), **_provenance(scenario)})
 
 
 def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress: Progress | None) -> Run:
@@ -123,11 +130,16 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
             check_interrupt()
         netcdf.close()
         recording.close()
-        write_metrics(folder.path, {**judge.metrics(), "versions": versions()})
+        write_metrics(folder.path, {**judge.metrics(), **_provenance(scenario)})
         write_scenario(folder.path, scenario.resolved(folder.path), versions())
         write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish({"versions": versions()}))
+        return open_run(folder.finish(_provenance(scenario)))
+
+
+def _provenance(scenario: Scenario) -> dict[str, Any]:
+    """Return what a result was made with."""
+    return {"versions": versions(), "plugins": [asdict(plugin) for plugin in scenario.plugins]}
 
 
 def versions() -> dict[str, str]:

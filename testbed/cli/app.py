@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 from pathlib import Path
@@ -29,6 +30,17 @@ app.add_typer(cli_compensate.app)
 OK, MISSED, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
+PluginModules = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="MODULE",
+        help="Module, dotted or as the path of a .py, to load first: it runs with your rights. May be repeated.",
+    ),
+]
+AllowOutside = Annotated[
+    bool, typer.Option("--allow-outside", help="Let a recorded motion lie outside the scenario's folder.")
+]
 RunDir = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run folder.")]
 
 
@@ -36,21 +48,23 @@ RunDir = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run folder.")]
 def run(
     scenario: ScenarioFile,
     out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/<scenario name>.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Instead of the scenario's seed.")] = None,
     block: Annotated[
         float | None, typer.Option(help="Length of a block in seconds; the result does not depend on it.")
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
+    plugin: PluginModules = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Run a scenario, print its errors and write the run folder."""
     from testbed.chain.runner import run as run_scenario
     from testbed.cli.terminal import print_metrics, progress
     from testbed.scenario.loader import load_scenario
 
-    if block is not None and not block > 0.0:
-        problem = f"--block: expected more than 0 s, got {block}"
+    if block is not None and not 0.0 < block < math.inf:
+        problem = f"--block: expected more than 0 s, and finite, got {block}"
         raise ScenarioError(problem)
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     target = out or Path("runs") / loaded.name
     with progress(loaded.name, loaded.frame.duration) as tick:
         result = run_scenario(loaded, out=target, seed=seed, block=block, progress=tick)
@@ -64,23 +78,27 @@ def run(
 
 
 @app.command()
-def check(scenario: ScenarioFile) -> None:
+def check(
+    scenario: ScenarioFile,
+    plugin: PluginModules = None,
+    allow_outside: AllowOutside = False,
+) -> None:
     """Validate a scenario and print what was understood."""
     from testbed.cli.terminal import print_scenario
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     print_scenario(loaded, table_facts(loaded))
 
 
 @app.command("list")
-def list_parts() -> None:
+def list_parts(plugin: PluginModules = None) -> None:
     """List motions, sensors, presets, filters, beliefs, bands and papers."""
     from testbed.cli.catalogue import catalogue
     from testbed.cli.terminal import print_catalogue
 
-    print_catalogue(catalogue())
+    print_catalogue(catalogue(plugin or ()))
 
 
 @app.command()

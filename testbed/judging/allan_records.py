@@ -105,10 +105,13 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         If it is no run folder, the sensor is not in it or its readings have gaps.
     """
     from testbed.runs.folder import open_run
-    from testbed.scenario.loader import load_scenario
+    from testbed.scenario.loader import load_instruments
 
     run = open_run(folder)
-    scenario = load_scenario(folder / "scenario.yaml")
+    scenario = load_instruments(folder / "scenario.yaml")
+    if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
+        msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"
+        raise refusal(folder, msg, f"sensors.{sensor}")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")
     records = []

@@ -6,33 +6,39 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.document import Document, unknown_key
+from testbed.document import Document, Model, unknown_key
 from testbed.errors import UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.inputs.plugins import PluginError, Plugins, load_plugins, running
+from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable.turntable import TurntableParameters
 from testbed.parts import merge, preset, resolve
 from testbed.scenario.checks import cross_check
 from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
 from testbed.sensors import SENSORS
+from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
-    from testbed.models.motion import Motion
-    from testbed.sensors.base import Sensor
 
 _BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
 
 
-def load_scenario(path: str | Path) -> Scenario:
+def load_scenario(path: str | Path, *, plugins: Iterable[str] = (), allow_outside: bool = False) -> Scenario:
     """Read and validate a scenario.
 
     Parameters
     ----------
     path : str or Path
         A YAML 1.2 file; every dimensional value is a string with its unit.
+    plugins : iterable of str, optional
+        Modules, dotted or as paths of ``.py`` files, that are loaded first and whose classes the scenario may name as
+        ``module:Class``; those of the environment variable ``TESTBED_PLUGINS`` besides.
+    allow_outside : bool, optional
+        Whether a recorded motion may lie outside the scenario's folder.
 
     Returns
     -------
@@ -44,9 +50,9 @@ def load_scenario(path: str | Path) -> Scenario:
     ScenarioError
         With every finding at once: file, line, key and what was expected.
     """
+    loaded = load_plugins(plugins)
     document = Document(Path(path))
-    reader = _Reader(document, Path(path).resolve().parent)
-    scenario = reader.scenario()
+    scenario = _Reader(document, Path(path).resolve().parent, loaded, allow_outside=allow_outside).scenario()
     document.refuse()
     assert scenario is not None
     cross_check(scenario, document)
@@ -54,21 +60,63 @@ def load_scenario(path: str | Path) -> Scenario:
     return scenario
 
 
+def load_instruments(path: str | Path) -> Scenario:
+    """Read what a finished run's scenario says of frame, table and sensors; no plug-in is loaded.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``scenario.yaml`` of a run folder.
+
+    Returns
+    -------
+    Scenario
+        Without motion, filters, expectations and the sensors of plug-ins.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_scenario`.
+    """
+    document = Document(Path(path))
+    scenario = _Reader(document, Path(path).resolve().parent, Plugins(), allow_outside=False).instruments()
+    document.refuse()
+    assert scenario is not None
+    return scenario
+
+
 class _Reader:
     """Takes a document apart, part by part, so that every part's errors are found."""
 
-    def __init__(self, document: Document, folder: Path) -> None:
+    def __init__(self, document: Document, folder: Path, plugins: Plugins, *, allow_outside: bool) -> None:
         self._doc = document
         self._folder = folder
+        self._plugins = plugins
+        self._allow_outside = allow_outside
         self._presets: dict[str, Any] = {"sensors": {}}
 
+    def instruments(self) -> Scenario | None:
+        """Return the scenario without what reading its results does not need."""
+        data = self._doc.data
+        for key in ("motion", "fusion", "expect"):
+            data.pop(key, None)
+        shipped = {
+            name: entry
+            for name, entry in self._mapping(data.pop("sensors", None), ("sensors",)).items()
+            if not isinstance(entry, dict) or entry.get("type", name) in SENSORS
+        }
+        return self._joined({**data, "sensors": shipped, "motion": [{"static": {}}]})
+
     def scenario(self) -> Scenario | None:
-        data = dict(self._doc.data)
+        """Return the whole scenario; None if something is wrong, which the document knows."""
+        return self._joined(dict(self._doc.data))
+
+    def _joined(self, data: dict[str, Any]) -> Scenario | None:
         parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "expect")}
         for key in [key for key in data if key not in Frame.model_fields]:
             self._doc.find((key,), unknown_key(str(key), [*Frame.model_fields, *parts]))
             del data[key]
-        frame = self._doc.validate(Frame, data, (), self._folder)
+        frame = self._validate(Frame, data, (), shipped=True)
         turntable = self._turntable(parts["turntable"])
         motion = self._motion(parts["motion"])
         sensors, types = self._sensors(parts["sensors"])
@@ -79,8 +127,30 @@ class _Reader:
         if frame is None or turntable is None or self._doc.problems:
             return None
         return Scenario(
-            frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data, self._presets
+            frame,
+            turntable,
+            motion,
+            sensors,
+            types,
+            fusion,
+            expect,
+            self._doc.file,
+            self._doc.data,
+            self._presets,
+            self._plugins.used,
         )
+
+    def _validate(self, model: type[Model], data: Any, key: tuple[str | int, ...], *, shipped: bool) -> Model | None:
+        """Return `data` as `model`; what a plug-in's own model raises is a finding like any other."""
+        folder, outside = self._folder, self._allow_outside
+        if shipped:
+            return self._doc.validate(model, data, key, folder, allow_outside=outside)
+        try:
+            with running(f"plug-in {model.__module__}"):
+                return self._doc.validate(model, data, key, folder, allow_outside=outside)
+        except PluginError as error:
+            self._doc.find(key, str(error))
+            return None
 
     def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:
         if data is None:
@@ -108,7 +178,7 @@ class _Reader:
         key = ("turntable",)
         merged = self._with_preset(self._mapping(data, key), "testbed.models", key, "air_bearing")
         self._presets["turntable"] = merged or {}
-        return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
+        return None if merged is None else self._validate(TurntableParameters, merged, key, shipped=True)
 
     def _motion(self, data: Any) -> tuple[tuple[str, Motion], ...]:
         if not isinstance(data, list) or not data:
@@ -126,11 +196,12 @@ class _Reader:
             return None
         kind, parameters = next(iter(item.items()))
         try:
-            model = resolve("motion", str(kind), MOTIONS)
+            model = self._resolve("motion", str(kind), MOTIONS, Motion)
         except UnknownNameError as error:
             self._doc.find((*key, kind), str(error))
             return None
-        motion = self._doc.validate(model, self._mapping(parameters, (*key, kind)), (*key, kind), self._folder)
+        mapping = self._mapping(parameters, (*key, kind))
+        motion = self._validate(model, mapping, (*key, kind), shipped=kind in MOTIONS)
         return None if motion is None else (str(kind), motion)
 
     def _sensors(self, data: Any) -> tuple[dict[str, Sensor], dict[str, str]]:
@@ -151,11 +222,11 @@ class _Reader:
                 continue
             types[name] = kind
             try:
-                model = resolve("sensor", kind, SENSORS)
+                model = self._resolve("sensor", kind, SENSORS, Sensor)
             except UnknownNameError as error:
-                self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+                self._doc.find((*key, "type"), str(error) if ":" in kind else f"{error}; say which with 'type:'")
                 continue
-            sensor = self._doc.validate(model, merged, key, self._folder)
+            sensor = self._validate(model, merged, key, shipped=kind in SENSORS)
             if sensor is not None:
                 sensors[name] = sensor
         return sensors, types
@@ -178,13 +249,13 @@ class _Reader:
         if kind is None:
             return None
         try:
-            factory = resolve("filter", kind, FILTERS)
+            factory = self._resolve("filter", kind, FILTERS, object)
             belief = self._belief(believed, types, key)
         except UnknownNameError as error:
-            self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+            self._doc.find((*key, "type"), str(error) if ":" in kind else f"{error}; say which with 'type:'")
             return None
         model = getattr(factory, "Parameters", None)
-        parameters = entry if model is None else self._doc.validate(model, entry, key, self._folder)
+        parameters = entry if model is None else self._validate(model, entry, key, shipped=kind in FILTERS)
         if parameters is None or belief is None:
             return None
         return FilterSpec(kind, factory, parameters, belief, believed)
@@ -219,11 +290,17 @@ class _Reader:
             self._doc.find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(believed)}")
             return None
         read = {
-            str(name): self._doc.validate(SensorBelief, value, (*key, name), self._folder)
+            str(name): self._validate(SensorBelief, value, (*key, name), shipped=True)
             for name, value in believed.items()
         }
         known = {name: one for name, one in read.items() if one is not None}
         return known if len(known) == len(read) else None
+
+    def _resolve(self, kind: str, name: str, registry: Mapping[str, str], base: type[Any]) -> type[Any]:
+        part = resolve(kind, name, registry, self._plugins)
+        if not issubclass(part, base):
+            raise UnknownNameError(kind, name, registry, reason=f"expected a {base.__module__}.{base.__qualname__}")
+        return part
 
     def _type(self, given: Any, key: tuple[str | int, ...]) -> str | None:
         """Return the name of a part's kind; None, with the finding noted, if it is no name."""

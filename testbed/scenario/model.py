@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
-from testbed.models.motion import MotionProfile
+from testbed.fusion import FILTERS
+from testbed.inputs.plugins import running
+from testbed.models.motion import MotionProfile, watched
+from testbed.models.motions import MOTIONS
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
 from testbed.signals import BASE_RATE_HZ, random_stream
@@ -18,12 +22,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.fusion.belief import SensorBelief
+    from testbed.inputs.plugins import Plugin
     from testbed.models.motion import Motion
     from testbed.models.turntable.turntable import TurntableParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
+# What the signed 64 bits of run.nc hold.
+MOST_SEED = 2**63 - 1
 
 
 class Frame(Part):
@@ -54,7 +61,7 @@ class Frame(Part):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
     description: str = ""
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)] = 0
     duration: PositiveDuration
     settle: Duration = 0.0
     ramp_in: Duration = 0.5
@@ -103,13 +110,32 @@ class FilterSpec:
     belief: Mapping[str, SensorBelief]
     belief_name: Any
 
+    def start(self, sample_rate_hz: Mapping[str, float]) -> Any:
+        """Return the filter at its beginning.
+
+        Parameters
+        ----------
+        sample_rate_hz : mapping of str to float
+            Rate of each sensor [Hz].
+
+        Raises
+        ------
+        ValueError
+            If belief, rates and parameters do not fit together; PluginError for whatever a plug-in raises.
+        """
+        if self.type in FILTERS:
+            return self.factory(self.belief, sample_rate_hz, self.parameters)
+        # Copies: a plug-in may keep and change what it gets.
+        with running(f"plug-in {self.type}"):
+            return self.factory(dict(self.belief), dict(sample_rate_hz), deepcopy(self.parameters))
+
 
 @dataclass(frozen=True)
 class Scenario:
     """A validated scenario in SI.
 
     `source` is the mapping as written in the file, with the user's units, and `presets` holds the parts that presets
-    filled in; `file` is where it stands.
+    filled in; `file` is where it stands; `plugins` are those that were loaded for it.
     """
 
     frame: Frame
@@ -122,6 +148,7 @@ class Scenario:
     file: str
     source: Mapping[str, Any] = field(repr=False)
     presets: Mapping[str, Any] = field(repr=False)
+    plugins: tuple[Plugin, ...] = ()
 
     @property
     def name(self) -> str:
@@ -163,10 +190,10 @@ class Scenario:
             Length of the ramp-in instead of the scenario's [s].
         """
         seed, duration = self.frame.seed, self.frame.duration
-        terms = [
-            motion.start(duration, random_stream(seed, "motion", str(i), kind))
-            for i, (kind, motion) in enumerate(self.motion)
-        ]
+        terms = []
+        for i, (kind, motion) in enumerate(self.motion):
+            stream = random_stream(seed, "motion", str(i), kind)
+            terms.append(motion.start(duration, stream) if kind in MOTIONS else watched(kind, motion, duration, stream))
         return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
 
     def with_seed(self, seed: int) -> Scenario:

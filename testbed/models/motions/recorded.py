@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -15,23 +12,38 @@ from scipy.interpolate import CubicSpline
 
 from testbed import units
 from testbed.errors import Problem, ScenarioError
+from testbed.inputs.files import read_bytes
 from testbed.models.motion import Motion, RateFunction
+from testbed.models.record_file import CellError, read_columns
 from testbed.parts import Part
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Self
+
+    from numpy.typing import NDArray
 
     from testbed.signals import FloatArray
 
 _JITTER = 1e-3
 _BAND_POWER = 1e-6
+_MOST_BYTES = 1 << 25
 
 
 def _beside_scenario(path: Path, info: ValidationInfo) -> Path:
-    """Take a relative path from the scenario's folder, not from where the command is typed."""
-    folder = (info.context or {}).get("folder")
-    return (Path(folder) / path).resolve() if folder else path
+    """Take a relative path from the scenario's folder, not from where the command is typed, and stay in there."""
+    context = info.context or {}
+    if not context.get("folder"):
+        return path
+    folder = Path(context["folder"]).resolve()
+    try:
+        place = (folder / path).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        msg = "expected a path"
+        raise ValueError(msg) from error
+    if not place.is_relative_to(folder) and not context.get("allow_outside"):
+        msg = "expected a file in the scenario's folder; --allow-outside (allow_outside=True) lets it read others"
+        raise ValueError(msg)
+    return place
 
 
 class Column(Part):
@@ -67,7 +79,8 @@ class Recorded(Motion):
     Raises
     ------
     ScenarioError
-        If the file cannot be read, a value is missing or not finite, or the samples are uneven.
+        If the file cannot be read or is larger than 32 MiB, a value is missing or not finite, or the samples are
+        uneven.
     """
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
@@ -117,56 +130,41 @@ class Recorded(Motion):
 
     def _read(self) -> tuple[FloatArray, FloatArray]:
         """Return time [s] and rate [rad/s], even and finite."""
-        lines: list[int] = []
-        rows: list[tuple[float, float]] = []
+        text = self._text()
+        factors = units.parse(f"1 {self.time.unit}", "s"), units.parse(f"1 {self.rate.unit}", "rad/s")
         try:
-            for line, pair in self._rows(io.StringIO(self._content().decode("utf-8-sig"), newline="")):
-                lines.append(line)
-                rows.append(pair)
-        except (UnicodeDecodeError, csv.Error) as error:
-            self._refuse(f"cannot be read: {error}")
+            lines, rows = read_columns(text, (self.time.column, self.rate.column), factors)
+        except CellError as error:
+            self._refuse(str(error), error.line)
         if len(rows) < 4:
             self._refuse(f"expected at least 4 samples, got {len(rows)}")
-        t, rate = np.array(rows).T
-        step = float(np.median(np.diff(t)))
-        uneven = np.flatnonzero(~(np.abs(np.diff(t) - step) <= _JITTER * abs(step))) if step > 0 else np.array([0])
-        if uneven.size:
-            i = int(uneven[0])
-            self._refuse(
-                (
-                    f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is "
-                    f"{step:g} s; resample the record"
-                ),
-                lines[i + 1],
-            )
+        t, rate = rows.T
+        self._check_even(t, lines)
         return t, rate
 
-    def _content(self) -> bytes:
+    def _text(self) -> str:
         try:
-            content = self.file.read_bytes()
-        except OSError as error:
-            self._refuse(f"cannot be read: {error}")
+            return self._content().decode("utf-8-sig")
+        except UnicodeDecodeError:
+            self._refuse("expected a text in UTF-8, got a binary file")
+
+    def _content(self) -> bytes:
+        content = read_bytes(self.file, _MOST_BYTES, "a record")
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in {None, found}:
             self._refuse(f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since")
         return content
 
-    def _rows(self, stream: Any) -> Iterator[tuple[int, tuple[float, float]]]:
-        reader = csv.DictReader(stream)
-        names = reader.fieldnames or []
-        for column in (self.time.column, self.rate.column):
-            if column not in names:
-                self._refuse(f"no column {column!r}; the header has {', '.join(map(repr, names)) or 'nothing'}", 1)
-        second = units.parse(f"1 {self.time.unit}", "s")
-        radian = units.parse(f"1 {self.rate.unit}", "rad/s")
-        for row in reader:
-            try:
-                pair = float(row[self.time.column]) * second, float(row[self.rate.column]) * radian
-            except (TypeError, ValueError):
-                self._refuse("expected a number in both columns", reader.line_num)
-            if not all(map(math.isfinite, pair)):
-                self._refuse("expected finite numbers", reader.line_num)
-            yield reader.line_num, pair
+    def _check_even(self, t: FloatArray, lines: NDArray[np.int64]) -> None:
+        step = float(np.median(np.diff(t)))
+        uneven = np.flatnonzero(~(np.abs(np.diff(t) - step) <= _JITTER * abs(step))) if step > 0 else np.array([0])
+        if uneven.size:
+            i = int(uneven[0])
+            self._refuse(
+                f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is "
+                f"{step:g} s; resample the record",
+                int(lines[i + 1]),
+            )
 
     def _refuse(self, message: str, line: int | None = None) -> NoReturn:
         raise ScenarioError([Problem(message, file=str(self.file), line=line)])
