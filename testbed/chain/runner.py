@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import platform
 from contextlib import ExitStack
-from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from testbed._version import __version__
 from testbed.chain.interrupt import held_interrupts
 from testbed.chain.pipeline import simulate
 from testbed.errors import quoted
 from testbed.judging.judge import Judge
-from testbed.runs.folder import RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
+from testbed.notebook import Run, open_run
+from testbed.runs.attributes import provenance
+from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.netcdf import NetcdfStore
-from testbed.runs.results import MemoryStore, Run, assemble
+from testbed.runs.results import MemoryStore
 from testbed.scenario.model import MOST_SEED
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress |
         judge.write(part)
         if progress is not None:
             progress((part.start + part.n_time) / chain.rates["base"])
-    return assemble(memory.groups(), {**judge.metrics(), **_provenance(scenario)})
+    return Run.of(memory.groups(), judge.metrics(versions()))
 
 
 def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress: Progress | None) -> Run:
@@ -101,11 +102,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         scenario = scenario.kept_in(folder.path)
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain.rates, chain.step)
-        attributes = {
-            "scenario": scenario.name,
-            "seed": scenario.frame.seed,
-            **{f"{k}_version": v for k, v in versions().items()},
-        }
+        attributes = provenance(scenario.name, scenario.frame.seed, versions())
         netcdf = NetcdfStore(folder.path / "run.nc", chain.rates, scenario.frame.duration, attributes)
         stack.callback(netcdf.close)
         recording = stack.enter_context(
@@ -130,16 +127,12 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
             check_interrupt()
         netcdf.close()
         recording.close()
-        write_metrics(folder.path, {**judge.metrics(), **_provenance(scenario)})
+        metrics = judge.metrics(versions())
+        write_metrics(folder.path, metrics.to_dict())
         write_scenario(folder.path, scenario.resolved(folder.path), versions())
         write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish(_provenance(scenario)))
-
-
-def _provenance(scenario: Scenario) -> dict[str, Any]:
-    """Return what a result was made with."""
-    return {"versions": versions(), "plugins": [asdict(plugin) for plugin in scenario.plugins]}
+        return open_run(folder.finish({"versions": versions(), "plugins": metrics.plugins}))
 
 
 def versions() -> dict[str, str]:

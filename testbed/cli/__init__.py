@@ -1,5 +1,5 @@
 """The command line: the only room that prints."""
 
-from testbed.cli.app import main
+from testbed.cli.entry import main
 
 __all__ = ["main"]

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-import signal
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
 from testbed.cli import compensate as cli_compensate
-from testbed.errors import RunError, ScenarioError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import FrameType
+from testbed.cli.status import FAILED, MISSED, OK
+from testbed.errors import ScenarioError
 
 app = typer.Typer(
     name="testbed",
@@ -27,7 +22,6 @@ app = typer.Typer(
 
 app.add_typer(cli_compensate.app)
 
-OK, MISSED, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
 PluginModules = Annotated[
@@ -73,7 +67,7 @@ def run(
         from testbed.recording.viewer import open_viewer
 
         open_viewer(target)
-    if not all(row["met"] for row in result.metrics["expectations"]):
+    if not all(bound.met for bound in result.metrics.expectations):
         raise typer.Exit(MISSED)
 
 
@@ -168,38 +162,3 @@ def reproduce(
 
     for line in run_paper(paper, seeds, out or Path("runs") / paper):
         typer.echo(line)
-
-
-def main() -> None:
-    """Run the command line; errors become one clear message and the exit status of the contract."""
-    signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        status = app(standalone_mode=False)
-    except ScenarioError as error:
-        _fail(str(error), BAD_INPUT)
-    except RunError as error:
-        _fail(str(error), FAILED)
-    except Exception as error:  # noqa: BLE001 - told apart by _usage, which raises what it does not know
-        _usage(error)
-    # The command-line library turns an interrupt into its own exit status.
-    if status == INTERRUPTED:
-        _fail("interrupted; nothing was left behind", INTERRUPTED)
-    sys.exit(status if isinstance(status, int) else OK)
-
-
-def _usage(error: Exception) -> NoReturn:
-    """Show what is wrong with the call; anything else is a fault of ours and keeps its traceback."""
-    show: Callable[[], None] | None = getattr(error, "show", None)
-    if show is None:
-        raise error
-    show()
-    sys.exit(BAD_INPUT)
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
-    raise KeyboardInterrupt
-
-
-def _fail(message: str, status: int) -> NoReturn:
-    typer.echo(message if status == INTERRUPTED else f"error: {message}", err=True)
-    sys.exit(status)

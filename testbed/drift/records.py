@@ -167,9 +167,9 @@ def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     ScenarioError
         If it is no run folder, or has no such gyro or several.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     known = [name for name, signals in run.sensors.items() if "temperature" in signals]
     if sensor is not None and sensor not in known:
         raise refusal(folder, str(UnknownNameError("sensor with a thermometer", sensor, known)), "--sensor")

@@ -104,10 +104,10 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     ScenarioError
         If it is no run folder, the sensor is not in it or its readings have gaps.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
     from testbed.scenario.loader import load_instruments
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     scenario = load_instruments(folder / "scenario.yaml")
     if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
         msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import warnings
 from typing import TYPE_CHECKING, NoReturn
 
@@ -95,7 +96,7 @@ class ColumnFile:
         """Return the place of a column given by its name or its number."""
         if column in self._names:
             return self._names.index(column)
-        if not (column.isdigit() and 1 <= int(column) <= self._n_columns):
+        if not (re.fullmatch("[0-9]{1,9}", column) and 1 <= int(column) <= self._n_columns):
             known = (
                 f"the header has {', '.join(map(repr, self._names))}"
                 if self._names

@@ -8,7 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import testbed
-from testbed.cli.app import app, main
+from testbed.cli import main
+from testbed.cli.app import app
 from testbed.drift.records import Columns, read
 from testbed.drift.session import read_model
 from testbed.errors import ScenarioError
@@ -20,6 +21,7 @@ DEG_H = np.radians(1.0) / 3600.0
 def ends_with(arguments, monkeypatch, capsys):
     """Run the installed command, return its exit status and what it printed."""
     monkeypatch.setattr("sys.argv", ["testbed", "compensate", *map(str, arguments)])
+    monkeypatch.setattr("signal.signal", lambda *_: None)
     with pytest.raises(SystemExit) as end:
         main()
     return end.value.code, "".join(capsys.readouterr())

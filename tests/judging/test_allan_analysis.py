@@ -146,7 +146,9 @@ def test_a_gap_in_the_readings_is_refused(still_run, monkeypatch):
         name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate))
         for name, s in run.sensors.items()
     }
-    monkeypatch.setattr("testbed.runs.folder.open_run", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth))
+    monkeypatch.setattr(
+        "testbed.runs.results.RunRecord.open", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth)
+    )
     with pytest.raises(ScenarioError, match="without gaps, got 1 that are missing"):
         read_run(still_run, "mems_gyro")
 
