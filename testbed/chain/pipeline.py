@@ -13,7 +13,7 @@ from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError
 from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
-from testbed.scenario.step_choice import choose_step
+from testbed.scenario.step_choice import choose_step, exposed
 from testbed.sensors import SENSORS
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 from testbed.sensors.checked import CheckedSensor
@@ -53,7 +53,8 @@ class Chain:
             substeps=self.step.substeps,
             holds=self.step.holds,
             pose_stride=POSE_STRIDE,
-            exposed=[name for name, sensor in scenario.sensors.items() if sensor.exposed],
+            exposed=exposed(scenario),
+            modal=self.step.modal,
             floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
         )
         self._temperature = scenario.frame.temperature

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
-from testbed.inputs.plugins import load_plugins, offered
+from testbed.inputs.plugins import Plugins, load_plugins, offered
 from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.parts import resolve
@@ -18,14 +18,14 @@ from testbed.sensors import SENSORS
 from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
 
 _KINDS = {"motion": MOTIONS, "sensor": SENSORS, "filter": FILTERS}
 
 
 def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
-    """Return every name with one line, by kind.
+    """Return every name with its summary, one finished sentence, by kind.
 
     Parameters
     ----------
@@ -33,23 +33,23 @@ def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
         Modules whose classes are listed too; they are loaded. What installed packages offer is listed, not loaded.
     """
     loaded = load_plugins(plugins)
-    table = {
-        kind: {
-            **{name: _first_line(resolve(kind, name, registry)) for name in registry},
-            **{name: f"offered by {package}" for name, package in offered(kind).items()},
-        }
-        for kind, registry in _KINDS.items()
+    return {
+        **{f"{kind}s": _offered(kind, registry, loaded) for kind, registry in _KINDS.items()},
+        "turntable_presets": _heads("testbed.models", "presets"),
+        "sensor_presets": _heads("testbed.sensors", "presets"),
+        "beliefs": _heads("testbed.fusion", "beliefs"),
+        "band_sets": _heads("testbed.fusion", "bands"),
+        "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
+        "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }
-    for name, part in loaded.classes():
-        if kind := _kind(part):
-            table[kind][name] = _first_line(part)
-    table["turntable preset"] = _heads("testbed.models", "presets")
-    table["sensor preset"] = _heads("testbed.sensors", "presets")
-    table["belief"] = _heads("testbed.fusion", "beliefs")
-    table["band set"] = _heads("testbed.fusion", "bands")
-    table["drift model"] = {name: _first_line(fit).split(";")[0] for name, (_, fit, _) in METHODS.items()}
-    table["paper"] = {name: _first_line(importlib.import_module(module)) for name, module in PAPERS.items()}
-    return table
+
+
+def _offered(kind: str, registry: Mapping[str, str], loaded: Plugins) -> dict[str, str]:
+    return {
+        **{name: _summary(resolve(kind, name, registry)) for name in registry},
+        **{name: f"Offered by {package}." for name, package in offered(kind).items()},
+        **{name: _summary(part) for name, part in loaded.classes() if _kind(part) == kind},
+    }
 
 
 def _kind(part: type[Any]) -> str | None:
@@ -61,8 +61,9 @@ def _kind(part: type[Any]) -> str | None:
     return "filter" if hasattr(part, "process") else None
 
 
-def _first_line(part: Any) -> str:
-    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+def _summary(part: Any) -> str:
+    """Return the first paragraph of a docstring without its markup."""
+    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
 
 
 def _heads(package: str, folder: str) -> dict[str, str]:

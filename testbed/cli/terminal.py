@@ -1,21 +1,19 @@
-"""What the command line prints: tables, the understood scenario, progress."""
+"""What the command line prints: tables, and the understood scenario."""
 
 from __future__ import annotations
 
 import math
-import sys
-import time
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from testbed.cli.understood import understood
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from testbed.judging.allan_analysis import Analysis, Term
@@ -23,58 +21,8 @@ if TYPE_CHECKING:
     from testbed.runs.metrics import Budget, LineMetrics, RunMetrics, SourceMetrics, TurntableMetrics
     from testbed.scenario.model import Scenario
 
-_PLAIN_EVERY = 5.0
 # Columns of the terminal: errors of a filter beside its name, and gain, phase and error over optimum of one line.
 _TABLE_WIDTH, _LINE_WIDTH = 61, 31
-
-
-@contextmanager
-def progress(name: str, duration: float) -> Iterator[Callable[[float], None]]:
-    """Show progress on standard error: a bar with rate and remaining time, or plain lines without a terminal."""
-    if sys.stderr.isatty():
-        with _bar() as bar:
-            task = bar.add_task(name, total=duration, speed="")
-            yield _advance(bar, task)
-    else:
-        yield _plain(name, duration)
-
-
-def _bar() -> Progress:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[speed]}"),
-        TimeRemainingColumn(),
-    )
-    return Progress(*columns, console=Console(stderr=True))
-
-
-def _advance(bar: Progress, task: TaskID) -> Callable[[float], None]:
-    begin = time.monotonic()
-
-    def tick(done: float) -> None:
-        bar.update(task, completed=done, speed=f"{done / max(time.monotonic() - begin, 1e-9):.1f} x real time")
-
-    return tick
-
-
-def _plain(name: str, duration: float) -> Callable[[float], None]:
-    begin = last = time.monotonic()
-
-    def tick(done: float) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _PLAIN_EVERY or done >= duration:
-            speed = done / max(now - begin, 1e-9)
-            line = (
-                f"{name}: {done:.0f} of {duration:g} s, {speed:.1f} x real time, {(duration - done) / speed:.0f} "
-                f"s remaining"
-            )
-            print(line, file=sys.stderr, flush=True)  # noqa: T201 - this is the terminal
-            last = now
-
-    return tick
 
 
 def _console() -> Console:
@@ -152,14 +100,16 @@ def _print_table(console: Console, table: TurntableMetrics | None) -> None:
     if table.torque_limit_nm is not None and table.torque_margin is not None:
         torque += f" of {number(table.torque_limit_nm)} N m, margin {100 * table.torque_margin:.0f} %"
     noise = f"arithmetic noise of the truth {number(table.truth_noise_deg_s)} deg/s"
-    step = _step(table.step_s, table.step_factor, table.step_error)
+    step = _step(table.engine, table.step_s, table.step_factor, table.step_error)
     console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True, highlight=False)
 
 
-def _step(step: float | None, factor: float | None, error: float | None) -> str:
+def _step(engine: str | None, step: float | None, factor: float | None, error: float | None) -> str:
     if step is None or factor is None:
         return "integration step unknown"
-    measured = "" if error is None else f", error {error:.1e} of the largest rate against 50 us"
+    measured = "" if error is None else f", error {error:.1e} of the largest rate against MuJoCo at 50 us"
+    if engine == "modal":
+        return f"played by its modes, exact over each hold of {1e6 * step:g} us{measured}"
     length = f"{step:g} s" if step >= 1.0 else f"{1e6 * step:g} us"
     return f"integration step {length}, {factor:g} times the hold{measured}"
 
@@ -204,15 +154,11 @@ def _print_budget(console: Console, budget: Budget | None) -> None:
 def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = _console()
-    written = {key: f"{_plain_list(value)} (preset)" for key, value in _leaves(dict(scenario.presets))} | dict(
-        _leaves(dict(scenario.source))
-    )
     table = Table(
         "key", "as written", "understood (SI)", title=f"{scenario.name}: {scenario.file}", title_justify="left"
     )
-    for key, value in _leaves(scenario.resolved()):
-        if value not in ("", None):
-            table.add_row(key, _plain_list(written.get(key, "")), _plain_list(value))
+    for key, value in understood(scenario).items():
+        table.add_row(key, value["written"], value["si"])
     console.print(table)
     for name, sensor in scenario.sensors.items():
         if rows := sensor.datasheet():
@@ -224,10 +170,6 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     console.print("The scenario is valid.")
 
 
-def _plain_list(value: Any) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
 def _print_facts(console: Console, facts: TableFacts) -> None:
     modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
     torque = f"required torque {facts.required_torque:.4g} N m"
@@ -235,32 +177,24 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
     noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
-    step = _step(facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    step = _step(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:
             console.print(f"turntable: {line}", soft_wrap=True, highlight=False)
 
 
-def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (dotted key, value) of every scalar, lists of scalars kept whole."""
-    if isinstance(node, dict):
-        for key, value in node.items():
-            yield from _leaves(value, f"{prefix}.{key}" if prefix else str(key))
-    elif isinstance(node, list) and any(isinstance(item, dict) for item in node):
-        for i, value in enumerate(node):
-            yield from _leaves(value, f"{prefix}.{i}")
-    else:
-        yield prefix, node
-
-
 def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
-    """Print what there is to choose from."""
+    """Print what there is to choose from, the summaries wrapped beside the names."""
     console = _console()
     width = max(len(name) for names in table.values() for name in names)
     for kind, names in table.items():
-        console.print(f"[bold]{kind}s[/bold]")
-        for name, line in names.items():
-            console.print(f"  {name:<{width}}  {line}", soft_wrap=True, highlight=False)
+        console.print(f"[bold]{kind.replace('_', ' ')}[/bold]")
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(width=width + 2, no_wrap=True)
+        grid.add_column()
+        for name, summary in names.items():
+            grid.add_row(f"  {name}", Text(summary))
+        console.print(grid, highlight=False)
 
 
 def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:

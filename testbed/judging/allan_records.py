@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import UnknownNameError
-from testbed.runs.text import ColumnFile, frequency, refusal, unit_factor
+from testbed.runs.text import ColumnFile, quantity, refusal, unit_factor
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,7 +78,7 @@ def read(
         raise refusal(source, "expected a text file or a run folder, got neither")
     if unit is None:
         raise refusal(source, "expected the unit of the column, such as deg/s", "--unit")
-    rate_hz = None if rate is None else frequency(rate)
+    rate_hz = None if rate is None else quantity(rate, "Hz", "100 Hz", "--rate")
     return [read_file(source, unit=unit, column=column, sample_rate_hz=rate_hz, time=time, time_unit=time_unit)]
 
 
@@ -132,6 +132,9 @@ def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> Fl
     from testbed.sensors.base import ExposedStage, Surroundings
 
     instrument, base = scenario.sensors[name], scenario.base_rate_hz
+    if true_rate.size != scenario.n_time:
+        # A sensor of a plug-in, which is not read here, asked for another clock.
+        base = true_rate.size / scenario.frame.duration
     stage = instrument.model_copy(update={"noise": False}).start(base, scenario.frame.seed, name)
     if not isinstance(stage, ExposedStage):
         return stage.process(true_rate)

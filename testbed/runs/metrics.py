@@ -95,6 +95,7 @@ class TurntableMetrics(Entry):
     """How the table was integrated [s], followed its command [deg/s], used its motor [N m] and swings [Hz]."""
 
     mode: str | None = None
+    engine: str | None = None
     step_s: float | None = None
     step_error: float | None = None
     step_factor: float | None = None

@@ -23,8 +23,15 @@ if TYPE_CHECKING:
 _JITTER = 0.25
 
 
-def frequency(text: str) -> float:
-    """Return the frequency [Hz] that `text` gives, with its unit or as a number in hertz.
+def quantity(text: str, si: str, example: str, key: str) -> float:
+    """Return the positive quantity that `text` gives, with its unit or as a number in SI.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``100`` or ``2 kHz``.
+    si, example, key : str
+        SI unit of the result, a good text, and the option that gave it, for the message.
 
     Raises
     ------
@@ -32,11 +39,11 @@ def frequency(text: str) -> float:
         If it is none above zero.
     """
     try:
-        value = float(text) if _is_number(text) else units.parse(text, "Hz", example="100 Hz")
+        value = float(text) if _is_number(text) else units.parse(text, si, example=example)
     except ValueError as error:
-        raise ScenarioError([Problem(str(error), key="--rate")]) from error
+        raise ScenarioError([Problem(str(error), key=key)]) from error
     if not (value > 0.0 and math.isfinite(value)):
-        raise ScenarioError([Problem(f"expected more than 0 Hz, got {text}", key="--rate")])
+        raise ScenarioError([Problem(f"expected more than 0 {si}, got {text}", key=key)])
     return value
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, Model, unknown_key
-from testbed.errors import UnknownNameError, quoted
+from testbed.errors import ScenarioError, UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.inputs.plugins import PluginError, Plugins, load_plugins, running
@@ -21,7 +22,7 @@ from testbed.sensors import SENSORS
 from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
 
 _BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
@@ -51,8 +52,52 @@ def load_scenario(path: str | Path, *, plugins: Iterable[str] = (), allow_outsid
         With every finding at once: file, line, key and what was expected.
     """
     loaded = load_plugins(plugins)
-    document = Document(Path(path))
-    scenario = _Reader(document, Path(path).resolve().parent, loaded, allow_outside=allow_outside).scenario()
+    return read_document(Document(Path(path)), Path(path).resolve().parent, loaded, allow_outside=allow_outside)
+
+
+def as_scenario(given: object) -> Scenario:
+    """Return a scenario as it is, or read it from its file or from a mapping.
+
+    Parameters
+    ----------
+    given : Scenario, str, Path or mapping
+        Which; relative paths of a mapping begin in the working folder.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no valid scenario.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if isinstance(given, str | Path):
+        return load_scenario(given)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given)
+    msg = f"expected a scenario, its file or a mapping of its keys, got {quoted(given)}"
+    raise ScenarioError(msg)
+
+
+def read_document(document: Document, folder: Path, plugins: Plugins, *, allow_outside: bool) -> Scenario:
+    """Validate the content of a document as a scenario.
+
+    Parameters
+    ----------
+    document : Document
+        Of a file, or of a mapping built in Python.
+    folder : Path
+        Where relative paths in it begin.
+    plugins : Plugins
+        Whose classes it may name.
+    allow_outside : bool
+        Whether a recorded motion may lie outside the folder.
+
+    Raises
+    ------
+    ScenarioError
+        With every finding at once.
+    """
+    scenario = _Reader(document, folder, plugins, allow_outside=allow_outside).scenario()
     document.refuse()
     assert scenario is not None
     cross_check(scenario, document)
@@ -103,7 +148,7 @@ class _Reader:
         shipped = {
             name: entry
             for name, entry in self._mapping(data.pop("sensors", None), ("sensors",)).items()
-            if not isinstance(entry, dict) or entry.get("type", name) in SENSORS
+            if not isinstance(entry, dict) or str(entry.get("type", name)) in SENSORS
         }
         return self._joined({**data, "sensors": shipped, "motion": [{"static": {}}]})
 
@@ -135,9 +180,11 @@ class _Reader:
             fusion,
             expect,
             self._doc.file,
+            self._folder,
             self._doc.data,
             self._presets,
             self._plugins.used,
+            self._allow_outside,
         )
 
     def _validate(self, model: type[Model], data: Any, key: tuple[str | int, ...], *, shipped: bool) -> Model | None:
