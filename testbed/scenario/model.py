@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 
 from testbed.document import Document
 from testbed.fusion import FILTERS
+from testbed.fusion.belief import declared
 from testbed.inputs.plain import plain_tree
 from testbed.inputs.plugins import Plugins, load_plugins, running
 from testbed.models.motion import MotionProfile, watched
@@ -112,7 +113,6 @@ class FilterSpec:
     factory: Callable[..., Any]
     parameters: Any
     belief: Mapping[str, SensorBelief]
-    belief_name: Any
 
     def start(self, sample_rate_hz: Mapping[str, float]) -> Any:
         """Return the filter at its beginning.
@@ -291,7 +291,7 @@ class Scenario:
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
             "fusion": {
-                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
             "expect": _expectations(self.expect),
@@ -299,9 +299,10 @@ class Scenario:
 
 
 def _built(tree: Tree, folder: Path, file: str, plugins: Plugins, *, allow_outside: bool) -> Scenario:
+    from testbed.scenario.intake import Intake
     from testbed.scenario.loader import read_document
 
-    return read_document(Document(file, tree=tree), folder.resolve(), plugins, allow_outside=allow_outside)
+    return read_document(Intake(Document(file, tree=tree), folder.resolve(), plugins, allow_outside))
 
 
 def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
@@ -318,6 +319,12 @@ def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
     written = part.model_dump(mode="json", context={"border": True, "folder": folder})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def _belief(spec: FilterSpec) -> dict[str, Any] | str:
+    """Return what a filter believes; the exact belief as the word, since the sensors stand beside it."""
+    word = declared(spec.belief)
+    return word if word == "exact" else {name: dump(one) for name, one in spec.belief.items()}
 
 
 def _parameters(spec: FilterSpec) -> dict[str, Any]:
