@@ -19,6 +19,7 @@ from testbed._version import __version__
 if TYPE_CHECKING:
     from testbed.chain.runner import run
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
+    from testbed.logs import read_log
     from testbed.notebook import Run, open_run
     from testbed.scenario.beliefs import belief_of
     from testbed.scenario.loader import load_scenario
@@ -35,6 +36,7 @@ __all__ = [
     "belief_of",
     "load_scenario",
     "open_run",
+    "read_log",
     "run",
 ]
 
@@ -48,6 +50,7 @@ _LAZY = {
     "belief_of": "testbed.scenario.beliefs",
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
+    "read_log": "testbed.logs",
     "run": "testbed.chain.runner",
 }
 

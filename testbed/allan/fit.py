@@ -199,6 +199,7 @@ class _Problem:
             )
             raise ValueError(msg)
         self._tau, self._n_time = curve.tau, curve.n_time
+        self._used = 1.0 if curve.used is None else curve.used
         self._m = np.round(curve.tau * curve.sample_rate_hz)
         self._measured = curve.deviation**2
         self._columns = _columns(self._tau, self._m)
@@ -261,7 +262,7 @@ class _Problem:
         """Return the standard deviations of the Allan variances if `model` is their expectation."""
         alphas = curve_exponents(self._m, model)
         pairs = zip(self._m, alphas, strict=True)
-        edf = np.array([equivalent_freedom(int(m), self._n_time + 1, int(a)) for m, a in pairs])
+        edf = self._used * np.array([equivalent_freedom(int(m), self._n_time + 1, int(a)) for m, a in pairs])
         spread: FloatArray = model * np.sqrt(2.0 / edf)
         return spread
 

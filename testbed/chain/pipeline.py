@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from testbed.scenario.step_choice import choose_step, exposed
 from testbed.sensors import SENSORS
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 from testbed.sensors.checked import CheckedSensor
-from testbed.signals import random_stream
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
-# Samples: a second at 20 kHz.
-_BLOCK = 20_000
 
 
 class Chain:
@@ -44,7 +41,6 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion, base = scenario.profile(), scenario.base_rate_hz
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        seed, duration = scenario.frame.seed, scenario.frame.duration
         self.step = choose_step(scenario)
         self.turntable = Turntable(
             scenario.turntable,
@@ -55,10 +51,12 @@ class Chain:
             pose_stride=POSE_STRIDE,
             exposed=exposed(scenario),
             modal=self.step.modal,
-            floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
+            floor=scenario.floor(),
         )
         self._temperature = scenario.frame.temperature
-        self._sensors = {name: sensor.start(base, seed, name) for name, sensor in scenario.sensors.items()}
+        self._sensors = {
+            name: sensor.start(base, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
+        }
         self._foreign = {
             name: CheckedSensor(name, round(base / sensor.sample_rate))
             for name, sensor in scenario.sensors.items()
@@ -132,7 +130,7 @@ def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Ite
         Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
+    step = BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 

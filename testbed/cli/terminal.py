@@ -211,7 +211,7 @@ def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
 
     console = _console()
     for analysis in analyses:
-        console.print(f"[bold]{analysis.record.content}[/bold]", soft_wrap=True, highlight=False)
+        console.print(analysis.record.content, style="bold", soft_wrap=True, highlight=False, markup=False)
         console.print(
             f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz", highlight=False
         )

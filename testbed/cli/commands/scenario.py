@@ -28,7 +28,7 @@ def run(
     """Run a scenario, print its errors and write the run folder."""
     from testbed.chain.runner import run as run_scenario
     from testbed.cli.terminal import print_metrics
-    from testbed.runs.text import quantity
+    from testbed.logs.options import quantity
     from testbed.scenario.loader import load_scenario
 
     length = None if block is None else quantity(block, "s", "20 ms", "--block")

@@ -1,10 +1,12 @@
-"""Motion read from a CSV file."""
+"""Motion read from a recording."""
 
 from __future__ import annotations
 
 import hashlib
+import re
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -13,20 +15,25 @@ from scipy.interpolate import CubicSpline
 from testbed import units
 from testbed.errors import Problem, ScenarioError
 from testbed.inputs.files import read_bytes
+from testbed.logs.clock import NANO
+from testbed.logs.formats import open_table
+from testbed.logs.logmap import ChannelMap, TimeMap
+from testbed.logs.options import refusal
+from testbed.logs.plan import plan
+from testbed.logs.reader import read_plans
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.record_file import CellError, read_columns
 from testbed.parts import Part
 
 if TYPE_CHECKING:
     from typing import Self
 
-    from numpy.typing import NDArray
-
+    from testbed.logs.channel import LogChannel
     from testbed.signals import FloatArray
 
 _JITTER = 1e-3
 _BAND_POWER = 1e-6
 _MOST_BYTES = 1 << 25
+_ECHO = re.compile(r"""; the header has|, got ['"]|: ['"]""")
 
 
 def _beside_scenario(path: Path, info: ValidationInfo) -> Path:
@@ -52,7 +59,7 @@ class Column(Part):
     Parameters
     ----------
     column : str
-        Its name in the header line.
+        Its name in the header, or its number from 1 on.
     unit : str
         Unit of its numbers.
     """
@@ -62,14 +69,15 @@ class Column(Part):
 
 
 class Recorded(Motion):
-    """Rate measured elsewhere, from a CSV file with a header line, joined by a cubic spline (continuous acceleration).
+    """Rate measured elsewhere, from a recording of any format, joined by a cubic spline (continuous acceleration).
 
-    Uneven or missing samples are refused with their line: a step may differ from the median step by 0.1 %.
+    Uneven or missing samples are refused with their line: a step may differ from the usual one by 0.1 % and what the
+    stamps are rounded to.
 
     Parameters
     ----------
     file : Path
-        The CSV file; relative to the scenario.
+        The recording; relative to the scenario.
     time, rate : Column
         Name and unit of both columns.
     sha256 : str, optional
@@ -130,41 +138,43 @@ class Recorded(Motion):
 
     def _read(self) -> tuple[FloatArray, FloatArray]:
         """Return time [s] and rate [rad/s], even and finite."""
-        text = self._text()
-        factors = units.parse(f"1 {self.time.unit}", "s"), units.parse(f"1 {self.rate.unit}", "rad/s")
+        self._content()
+        time = TimeMap(column=self.time.column, unit=self.time.unit)
+        mapped = ChannelMap(column=self.rate.column, unit=self.rate.unit, kind="rate", time=time)
         try:
-            lines, rows = read_columns(text, (self.time.column, self.rate.column), factors)
-        except CellError as error:
-            self._refuse(str(error), error.line)
-        if len(rows) < 4:
-            self._refuse(f"expected at least 4 samples, got {len(rows)}")
-        t, rate = rows.T
-        self._check_even(t, lines)
-        return t, rate
-
-    def _text(self) -> str:
-        try:
-            return self._content().decode("utf-8-sig")
-        except UnicodeDecodeError:
-            self._refuse("expected a text in UTF-8, got a binary file")
+            table = open_table(self.file)
+            channel = read_plans([plan("rate", mapped, table, lambda field: field.partition(".")[0])])["rate"]
+            rate = channel.whole()
+        except ScenarioError as error:
+            raise ScenarioError([_discreet(problem) for problem in error.problems]) from error
+        _refuse_jitter(channel)
+        return np.arange(rate.size) / channel.rate_hz, rate
 
     def _content(self) -> bytes:
         content = read_bytes(self.file, _MOST_BYTES, "a record")
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in {None, found}:
-            self._refuse(f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since")
+            message = f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since"
+            raise refusal(self.file, message)
         return content
 
-    def _check_even(self, t: FloatArray, lines: NDArray[np.int64]) -> None:
-        step = float(np.median(np.diff(t)))
-        uneven = np.flatnonzero(~(np.abs(np.diff(t) - step) <= _JITTER * abs(step))) if step > 0 else np.array([0])
-        if uneven.size:
-            i = int(uneven[0])
-            self._refuse(
-                f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is "
-                f"{step:g} s; resample the record",
-                int(lines[i + 1]),
-            )
 
-    def _refuse(self, message: str, line: int | None = None) -> NoReturn:
-        raise ScenarioError([Problem(message, file=str(self.file), line=line)])
+def _discreet(problem: Problem) -> Problem:
+    """Return a finding without what else stands in the file: a scenario names it, so its reader may not know it."""
+    if problem.line is not None and "fields" not in problem.message:
+        return problem
+    return replace(problem, message=_ECHO.split(problem.message, maxsplit=1)[0])
+
+
+def _refuse_jitter(channel: LogChannel) -> None:
+    """Refuse steps that differ by more than a spline bears and the rounding of the stamps explains."""
+    assert channel.clock is not None
+    assert channel.stamps_ns is not None
+    steps, step = np.diff(channel.stamps_ns), channel.clock.step_ns
+    uneven = np.flatnonzero(np.abs(steps - step) > _JITTER * step + channel.clock.quantum_ns)
+    if uneven.size:
+        i = int(uneven[0])
+        start, stop = (NANO * float(channel.stamps_ns[k] - channel.stamps_ns[0]) for k in (i, i + 1))
+        place = f"time goes from {start:g} s to {stop:g} s after the start"
+        message = f"uneven or missing sample: {place} where the usual step is {NANO * step:g} s; resample the record"
+        raise refusal(channel.table.path, message, line=channel.table.line(i + 1))
