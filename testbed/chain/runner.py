@@ -65,6 +65,12 @@ def run(
         If the plant diverges, the motor saturates or the disk is full; says how far it got.
     ScenarioError
         If the scenario is bad, or `out` cannot be written or holds something else.
+
+    Examples
+    --------
+    >>> still = {"name": "still", "duration": "0.1 s", "motion": [{"static": {}}], "turntable": {"mode": "fixed"}}
+    >>> run(still, seed=3)
+    <Run still, 0.1 s, seed 3>
     """
     if block is not None and not 0.0 < block < math.inf:
         msg = f"block: expected more than 0 s, and finite, got {block!r}"

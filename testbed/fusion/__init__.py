@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from testbed.fusion.base import EstimateBlock
 
-__all__ = ["FILTERS", "EstimateBlock", "estimate"]
+__all__ = ["FILTERS", "EstimateBlock", "estimate", "list_filters"]
 
 FILTERS = {
     "kalman": "testbed.fusion.filters.kalman:Kalman",
@@ -27,6 +27,17 @@ FILTERS = {
     "wideband": "testbed.fusion.filters.wideband:Wideband",
     "allan_srkf": "testbed.fusion.filters.allan_srkf:AllanSrkf",
 }
+
+
+def list_filters() -> list[str]:
+    """Return the names of the filters, as `estimate` and a scenario take them.
+
+    Examples
+    --------
+    >>> "kalman" in list_filters()
+    True
+    """
+    return sorted(FILTERS)
 
 
 def estimate(
@@ -70,6 +81,17 @@ def estimate(
         If a parameter, a rate or the length of a record is wrong.
     RunError
         If a filter that is not shipped raises anything, or gives what is no estimate.
+
+    Examples
+    --------
+    A second at rest, as two sensors without noise would read it: the estimate is zero, with the std that the belief
+    in their noise leaves.
+
+    >>> import numpy as np
+    >>> readings = {"mhd_ars": np.zeros(20_000), "mems_gyro": np.zeros(2_000)}
+    >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3})
+    >>> found.rate.shape, bool(np.all(found.rate == 0.0)), bool(found.std[-1] < found.std[0])
+    ((20000,), True, True)
     """
     from testbed.fusion.belief import default_belief, load_belief
     from testbed.fusion.checked import CheckedFilter

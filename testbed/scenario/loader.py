@@ -53,6 +53,12 @@ def load_scenario(path: str | Path, *, plugins: Iterable[str] = (), allow_outsid
     ------
     ScenarioError
         With every finding at once: file, line, key and what was expected.
+
+    Examples
+    --------
+    >>> load_scenario("no.yaml")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: no.yaml: cannot be read: No such file or directory
     """
     loaded = load_plugins(plugins)
     return read_document(Intake(Document(Path(path)), Path(path).resolve().parent, loaded, allow_outside))
