@@ -53,6 +53,15 @@ def allan_deviation(rate: ArrayLike, sample_rate_hz: float, tau: ArrayLike | Non
     ----------
     Riley, "Handbook of Frequency Stability Analysis", NIST SP 1065 (2008);
     Greenhall and Riley, "Uncertainty of stability variances based on finite differences", PTTI 2003.
+
+    Examples
+    --------
+    White noise of 1 rad/s falls as the root of the averaging time.
+
+    >>> white = np.random.default_rng(1).standard_normal(10_000)
+    >>> curve = allan_deviation(white, 1.0, tau=[1.0, 100.0])
+    >>> bool(curve.lower[1] < 0.1 < curve.upper[1])
+    True
     """
     record = _checked(rate, sample_rate_hz)
     n_time = record.size

@@ -125,6 +125,14 @@ def fit_allan(curve: AllanCurve) -> AllanFit:
     ------
     ValueError
         If there are fewer than 5 averaging times, or the record is constant or a ramp without noise.
+
+    Examples
+    --------
+    >>> from testbed.allan import allan_deviation
+    >>> white = np.random.default_rng(1).standard_normal(10_000)
+    >>> found = fit_allan(allan_deviation(white, 1.0)).angle_random_walk
+    >>> bool(found.lower < 1.0 < found.upper)
+    True
     """
     problem = _Problem(curve)
     squares = problem.solve()

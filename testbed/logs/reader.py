@@ -54,10 +54,10 @@ def read_log(
     --------
     >>> import pathlib, tempfile
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
-    >>> _ = path.write_text("t [us],gyro [deg/s]\\n" + "".join(f"{500 * k},{k % 2}\\n" for k in range(100)))
+    >>> _ = path.write_text("t [us],gyro [deg/s]\n" + "".join(f"{500 * k},{k % 2}\n" for k in range(100)))
     >>> channel = read_log(path).channels["gyro"]
-    >>> round(channel.rate_hz, 6), channel.values[1].round(6)
-    (2000.0, np.float64(0.017453))
+    >>> round(channel.rate_hz, 6), round(float(channel.values[1]), 6)
+    (2000.0, 0.017453)
     """
     return read_map(Path(path), as_map(map))
 

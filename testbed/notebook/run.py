@@ -73,5 +73,11 @@ def open_run(folder: str | Path) -> Run:
     ------
     ScenarioError
         If it is no run folder, or a file in it is damaged.
+
+    Examples
+    --------
+    >>> open_run("nowhere")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: nowhere: expected a run folder, but nowhere/scenario.yaml, ... is missing
     """
     return Run.open(folder)

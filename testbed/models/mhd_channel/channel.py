@@ -71,6 +71,12 @@ class MhdChannel(Part):
     References
     ----------
     Su et al., IEEE Trans. Instrum. Meas. 2024, doi 10.1109/TIM.2024.3375962, equation (2).
+
+    Examples
+    --------
+    >>> channel = MhdChannel(fluid="mercury", height=15e-3, field=0.448)
+    >>> abs(channel.response([0.01, 1.0, 100.0])).round(3)
+    array([0.004, 0.373, 0.998])
     """
 
     fluid: NamedFluid
@@ -244,6 +250,12 @@ def one_mode_response(channel: MhdChannel, freq_hz: ArrayLike) -> ComplexArray:
     References
     ----------
     Su et al., IEEE Trans. Instrum. Meas. 2024, equation (4).
+
+    Examples
+    --------
+    >>> channel = MhdChannel(fluid="mercury", height=15e-3, field=0.448)
+    >>> abs(one_mode_response(channel, [1.0])).round(3)
+    array([0.377])
     """
     s = _laplace(freq_hz)
     response: ComplexArray = s / (s + _one_mode_rate(channel))

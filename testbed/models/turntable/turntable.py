@@ -104,6 +104,18 @@ class Turntable:
         modes are asked for where they do not hold.
     ValueError
         If the floor moves and `floor` is not given.
+
+    Examples
+    --------
+    A tenth of a second of a 10 Hz swing, and what a sensor on the table feels of it.
+
+    >>> from testbed.models.motion import MotionProfile
+    >>> from testbed.models.turntable import Mounting, TurntableParameters
+    >>> motion = MotionProfile([lambda t: 0.01 * np.sin(20.0 * np.pi * t)], 0.0, BASE_RATE_HZ)
+    >>> table = Turntable(TurntableParameters(), {"gyro": Mounting()})
+    >>> truth = table.process(motion.process(2000))
+    >>> round(float(truth.sensor_rate["gyro"].max()), 3)
+    0.01
     """
 
     def __init__(
