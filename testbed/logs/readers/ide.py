@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_ide(path: Path, kind: str) -> ArrayTable:
     """Return the subchannels of an IDE file, with a column ``time`` in microseconds for each channel.
 
     Parameters

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_mdf(path: Path, kind: str) -> ArrayTable:
     """Return the channels of an MDF file, with a column ``time`` for each group.
 
     Parameters

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_miniseed(path: Path, kind: str) -> ArrayTable:
     """Return the traces of a MiniSEED file: counts, with stamps from the start and rate of each piece.
 
     Parameters

@@ -23,7 +23,7 @@ _SUFFIX = {"ROS bag": ".bag", "ROS 2 bag (db3)": ".db3", "MCAP": ".mcap"}
 _LONGEST = 16
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_ros(path: Path, kind: str) -> ArrayTable:
     """Return the numbers of all topics of a bag.
 
     Parameters

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_tdms(path: Path, kind: str) -> ArrayTable:
     """Return the channels of a TDMS file, with the rate and start that a waveform states.
 
     Parameters

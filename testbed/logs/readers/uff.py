@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _TIME_RESPONSE = 1
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_uff(path: Path, kind: str) -> ArrayTable:
     """Return the time responses of a UFF file, with the rate that each states.
 
     Parameters

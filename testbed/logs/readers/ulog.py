@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def open_file(path: Path, kind: str) -> ArrayTable:
+def open_ulog(path: Path, kind: str) -> ArrayTable:
     """Return the fields of all topics of a ULog.
 
     Parameters
