@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, ClassVar
 
 
 def _option(default: Any, option: str, text: str) -> Any:
@@ -31,6 +31,8 @@ class Columns:
     sensor : str, optional
         Of a run folder.
     """
+
+    PANEL: ClassVar[str] = "Columns"
 
     rate: str = _option("rate", "--column", "Column of the rate, by name or number from 1 on.")
     rate_unit: str | None = _option(None, "--unit", "Unit of the rate; default that in the file, or deg/h.")

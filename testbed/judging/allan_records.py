@@ -135,10 +135,13 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         If it is no run folder, or the sensor is not in it or was never read.
     """
     from testbed.runs.results import RunRecord
-    from testbed.scenario.loader import load_scenario
+    from testbed.scenario.loader import load_instruments
 
     run = RunRecord.open(folder)
-    scenario = load_scenario(folder / "scenario.yaml")
+    scenario = load_instruments(folder / "scenario.yaml")
+    if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
+        msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"
+        raise refusal(folder, msg, f"sensors.{sensor}")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")
     records = []
@@ -158,6 +161,9 @@ def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> Fl
     from testbed.sensors.base import ExposedStage, Surroundings
 
     instrument, base = scenario.sensors[name], scenario.base_rate_hz
+    if true_rate.size != scenario.n_time:
+        # A sensor of a plug-in, which is not read here, asked for another clock.
+        base = true_rate.size / scenario.frame.duration
     stage = instrument.model_copy(update={"noise": False}).start(base, scenario.frame.seed, name)
     if not isinstance(stage, ExposedStage):
         return stage.process(true_rate)

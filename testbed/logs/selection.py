@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path  # noqa: TC003 - the command line reads the types of the fields
-from typing import Any
+from typing import Any, ClassVar
 
 
 def _words(name: str, text: str, metavar: str | None = None) -> dict[str, Any]:
@@ -26,6 +26,8 @@ class TextOptions:
     skip : int, optional
         Lines to leave out before the header, or before the first row where there is none.
     """
+
+    PANEL: ClassVar[str] = "Text file"
 
     separator: str | None = field(
         default=None,
@@ -55,6 +57,8 @@ class Selection:
     map : Path, optional
         The map, instead of all these but `column`, which then are its channels.
     """
+
+    PANEL: ClassVar[str] = "Channel"
 
     column: list[str] | None = field(
         default=None,

@@ -29,7 +29,8 @@ def record(n=20_000):
 
 
 def test_every_concrete_sensor_is_registered():
-    assert set(Sensor.__subclasses__()) <= {resolve("sensor", name, SENSORS) for name in SENSORS}
+    ours = {part for part in Sensor.__subclasses__() if part.__module__.startswith("testbed.")}
+    assert ours <= {resolve("sensor", name, SENSORS) for name in SENSORS}
 
 
 @pytest.mark.parametrize("name", PRESETS)
