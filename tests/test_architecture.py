@@ -33,7 +33,7 @@ ROOMS = {
     "scenario": {"models", "sensors", "fusion"},
     "report": {"pages", "metrics", "runs"},
     "recording": {"pages", "metrics", "runs"},
-    "notebook": {"runs", "report"},
+    "notebook": {"pages", "runs", "report"},
     "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
     "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording", "notebook"},
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
