@@ -78,6 +78,7 @@ class TwoPaths(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
+    needs_both = True
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters
@@ -145,9 +146,6 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     """Return the places of the sensor that is better at low frequency and of the other, which must be read at every
     step.
     """
-    if len(model.sensors) != 2:
-        msg = f"belief: expected two sensors to divide the band between, got {list(model.sensors)}"
-        raise ValueError(msg)
     ends = np.array([input_psd(belief[name])(np.array([LOW_HZ, HIGH_HZ])) for name in model.sensors])
     slow = int(np.argmin(ends[:, 0]))
     fast = 1 - slow
