@@ -21,8 +21,8 @@ from testbed.parts import resolve
 from testbed.reproduce.paper1 import SIGNALS
 from testbed.sensors import load_preset
 from testbed.signals import random_stream
+from testbed.units import DEG
 
-DEG = np.pi / 180.0
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
 SENSORS = {"mhd_ars": load_preset("sx300"), "mems_gyro": load_preset("adis16505_filtered")}
 BELIEF = load_belief("identified")

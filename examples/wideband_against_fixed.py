@@ -29,6 +29,7 @@ from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.models.motions.sine import Sine
 from testbed.sensors import load_preset
 from testbed.signals import random_stream
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.signals import FloatArray
 
-DEG = np.pi / 180.0
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
 SENSORS = {"mhd_ars": load_preset("sx300"), "mems_gyro": load_preset("adis16505_filtered")}
 BELIEF = load_belief("identified")

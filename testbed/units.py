@@ -28,7 +28,8 @@ from testbed.errors import quoted
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
-DEG_H = math.radians(1.0) / 3600.0  # rad/s
+DEG = math.radians(1.0)  # rad
+DEG_H = DEG / 3600.0  # rad/s
 CELSIUS = 273.15  # K, 0 degC
 
 _DEFINITIONS = """

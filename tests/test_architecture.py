@@ -120,6 +120,26 @@ def test_the_foundation_knows_no_room(name):
         assert set(imports_of(path)) <= FOUNDATION
 
 
+# Every paper's module has a `report`; the command line's functions are named as its commands.
+SHARED_NAMES = {"report"}
+# A record of a rate and one with its temperature are read in two rooms, by two readers.
+TWO_READERS = {"Record", "read", "read_file", "read_run"}
+
+
+@pytest.mark.contract
+def test_a_public_name_has_one_meaning():
+    """A class or function of a module is called as no other one, so that a name leads to its place."""
+    places = {}
+    for path in MODULES:
+        if path.parent.name == "commands":
+            continue
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(dotted(path))
+    twice = {name: found for name, found in places.items() if len(found) > 1}
+    assert {name: found for name, found in twice.items() if name not in SHARED_NAMES | TWO_READERS} == {}
+
+
 PUBLIC = {
     "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError",
     "testbed.cli": "main",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
 from testbed.scenario.step_choice import choose_step, exposed
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
-from testbed.signals import random_stream
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
-# Samples: a second at 20 kHz.
-_BLOCK = 20_000
 
 
 class Chain:
@@ -40,7 +37,6 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion, base = scenario.profile(), scenario.base_rate_hz
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        seed, duration = scenario.frame.seed, scenario.frame.duration
         self.step = choose_step(scenario)
         self.turntable = Turntable(
             scenario.turntable,
@@ -51,10 +47,12 @@ class Chain:
             pose_stride=POSE_STRIDE,
             exposed=exposed(scenario),
             modal=self.step.modal,
-            floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
+            floor=scenario.floor(),
         )
         self._temperature = scenario.frame.temperature
-        self._sensors = {name: sensor.start(base, seed, name) for name, sensor in scenario.sensors.items()}
+        self._sensors = {
+            name: sensor.start(base, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
+        }
         rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
         self._fusion = {
             name: spec.factory(spec.belief, rates, spec.parameters) for name, spec in scenario.fusion.items()
@@ -113,7 +111,7 @@ def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Ite
         Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
+    step = BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 

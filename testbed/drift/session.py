@@ -11,7 +11,7 @@ import numpy as np
 
 from testbed.compensation import PAPER, paper3
 from testbed.compensation.model_only import METHODS, DriftModel, train
-from testbed.drift.leak import audit
+from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.records import ThermalRecord, check_options, read
 from testbed.errors import Problem, ScenarioError, UnknownNameError
@@ -211,7 +211,7 @@ def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited
         return paper3.compensate(record).rate
 
     compensated = compensate(thermal.record)
-    found = audit(compensate, thermal.record, compensated, thermal.drift, tell)
+    found = find_leaks(compensate, thermal.record, compensated, thermal.drift, tell)
     return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
 
 
@@ -219,7 +219,7 @@ def _audit_trained(
     path: Path, model: DriftModel, trained_on: dict[str, str], thermal: ThermalRecord, tell: Callable[[str], None]
 ) -> Audited:
     block = model.apply(thermal.record)
-    found = audit(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
+    found = find_leaks(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
     found = replace(found, seen=thermal.fingerprint in trained_on)
     name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
     return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LETTERS = ("Q", "N", "B")
 
 
-def summary(audit: Audit) -> dict[str, Any]:
+def audit_summary(audit: Audit) -> dict[str, Any]:
     """Return the figures of an audit; None where they are not known or mean nothing.
 
     Parameters

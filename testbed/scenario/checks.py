@@ -13,12 +13,11 @@ from testbed.models.turntable.servo import required_torque
 from testbed.models.turntable.turntable import Turntable, check_plant
 from testbed.scenario.model import METRICS
 from testbed.scenario.step_choice import excerpt, exposed, given_step
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from testbed.document import Document
     from testbed.scenario.model import Scenario
-
-_BLOCK = 20_000
 
 
 def cross_check(scenario: Scenario, document: Document) -> None:
@@ -166,8 +165,8 @@ def command_peaks(scenario: Scenario) -> tuple[float, float]:
     """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
     motion = scenario.profile()
     peak_rate = peak_torque = 0.0
-    for start in range(0, scenario.n_time, _BLOCK):
-        command = motion.process(min(_BLOCK, scenario.n_time - start))
+    for start in range(0, scenario.n_time, BLOCK):
+        command = motion.process(min(BLOCK, scenario.n_time - start))
         torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
         peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
         peak_torque = max(peak_torque, float(np.max(np.abs(torque))))

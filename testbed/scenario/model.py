@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,11 +25,15 @@ if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
     from testbed.inputs.tree import Tree
     from testbed.models.motion import Motion
+    from testbed.models.turntable.floor import FloorMotion
     from testbed.models.turntable.turntable import TurntableParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
+
+
+Seed = Annotated[int, Field(ge=0, strict=True)]
 
 
 class Frame(Part):
@@ -42,6 +47,9 @@ class Frame(Part):
         What the experiment shows.
     seed : int, optional
         Seed of every random stream.
+    truth_seed : int, optional
+        Seed of what the table really does, random motions and floor, instead of `seed`: then `seed` varies the noise of
+        the sensors alone.
     duration : float
         Length of the run [s].
     settle : float, optional
@@ -59,7 +67,8 @@ class Frame(Part):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
     description: str = ""
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Seed = 0
+    truth_seed: Seed | None = None
     duration: PositiveDuration
     settle: Duration = 0.0
     ramp_in: Duration = 0.5
@@ -135,6 +144,22 @@ class Scenario:
     presets: Mapping[str, Any] = field(repr=False)
 
     @property
+    def truth_seed(self) -> int:
+        """Seed of the random streams of the truth."""
+        return self.frame.seed if self.frame.truth_seed is None else self.frame.truth_seed
+
+    def floor(self, duration: float | None = None) -> FloorMotion:
+        """Return how the floor of the run moves.
+
+        Parameters
+        ----------
+        duration : float, optional
+            Length of the realisation instead of the run's [s].
+        """
+        stream = partial(random_stream, self.truth_seed, "turntable", "floor")
+        return self.turntable.floor.start(self.frame.duration if duration is None else duration, stream)
+
+    @property
     def name(self) -> str:
         """Name of the scenario."""
         return self.frame.name
@@ -173,9 +198,9 @@ class Scenario:
         ramp_in : float, optional
             Length of the ramp-in instead of the scenario's [s].
         """
-        seed, duration = self.frame.seed, self.frame.duration
+        duration = self.frame.duration
         terms = [
-            motion.start(duration, random_stream(seed, "motion", str(i), kind))
+            motion.start(duration, random_stream(self.truth_seed, "motion", str(i), kind))
             for i, (kind, motion) in enumerate(self.motion)
         ]
         return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)

@@ -182,11 +182,11 @@ def test_the_audit_of_a_text_file_needs_no_truth(table, model, tmp_path):
 
 def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
     """A compensation that trains on the record it corrects, here a smoother in the place of the paper's pipeline."""
-    from testbed.drift.quality import low_pass
+    from testbed.drift.quality import smoothed
 
     class Result:
         def __init__(self, record):
-            self.rate = record.rate - low_pass(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
+            self.rate = record.rate - smoothed(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
 
     monkeypatch.setattr("testbed.drift.session.paper3.compensate", Result)
     status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path], monkeypatch, capsys)

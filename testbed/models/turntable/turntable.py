@@ -17,6 +17,7 @@ from testbed.models.turntable.engine import Engine
 from testbed.models.turntable.modal import ModalEngine, check_modal
 from testbed.models.turntable.parameters import Cogging, Mounting, TurntableParameters
 from testbed.models.turntable.servo import required_torque
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -109,7 +110,7 @@ class Turntable:
         self,
         parameters: TurntableParameters,
         mountings: Mapping[str, Mounting],
-        sample_rate_hz: float = 20000.0,
+        sample_rate_hz: float = BASE_RATE_HZ,
         *,
         substeps: int = 1,
         holds: int = 1,
