@@ -11,17 +11,16 @@ from testbed.units import Frequency, Range
 
 
 class BlendParameters(Part):
-    """Up to where the fast sensor is followed, where the slow one takes over, and the lag that the claims allow for.
+    """Up to where the fast sensor is followed, where the slow one takes over [Hz], what lag the claims allow [rad/s].
 
     Parameters
     ----------
     bandwidth, crossover, lag : float
-        [Hz], [Hz], amplitude [rad/s].
     """
 
     bandwidth: Frequency = 1000.0
     crossover: Frequency = 0.01
-    lag: Range = np.radians(0.007)
+    lag: Range = np.radians(0.005)
 
 
 class Blend(BlockFilter):

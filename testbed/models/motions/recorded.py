@@ -7,7 +7,7 @@ import hashlib
 import io
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -69,6 +69,12 @@ class Recorded(Motion):
     ScenarioError
         If the file cannot be read, a value is missing or not finite, or the samples are uneven.
     """
+
+    example: ClassVar[dict[str, Any]] = {
+        "file": "record.csv",
+        "time": {"column": "t", "unit": "s"},
+        "rate": {"column": "w", "unit": "deg/s"},
+    }
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column
