@@ -289,7 +289,9 @@ def test_load_takes_a_users_users_filter_by_its_path(tmp_path, monkeypatch):
         "parameters\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    scenario = load(tmp_path, GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: users_filter:Mine, gain: 3}"))
+    scenario = load(
+        tmp_path, GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: users_filter:Mine, gain: 3}")
+    )
     assert scenario.fusion["kalman"].parameters == {"gain": 3}
     assert scenario.fusion["kalman"].factory.__name__ == "Mine"
 

@@ -19,6 +19,7 @@ from testbed.fusion.two_paths.design import (
     best_crossover,
     input_psd,
     low_pass,
+    without_far_zeros,
 )
 from testbed.fusion.two_paths.kernel import MEMORY_ROWS, two_paths
 from testbed.fusion.two_paths.noise import noise_variance
@@ -87,7 +88,8 @@ class TwoPaths(BlockFilter):
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
-        slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
+        clock = 2.0 * math.pi * self.model.sample_rate_hz
+        slow, fast = (without_far_zeros(belief[self.model.sensors[i]], clock) for i in (self._slow, self._fast))
         order = self.order(fast)
         self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
         power = parameters.amplitude**2 / 2.0
