@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from testbed.fusion.analysis.indicator import FrequencyIndicator
+from testbed.fusion.bands import increment_variance
 from testbed.fusion.belief import load_belief
-from testbed.fusion.filters.arw_shakf import increment_variance
 from testbed.sensors import load_preset
 from testbed.units import DEG
 

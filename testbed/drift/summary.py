@@ -12,7 +12,7 @@ from testbed.judging.allan_analysis import TERMS
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
-    from testbed.allan import AllanFit
+    from testbed.allan.fit import AllanFit
     from testbed.drift.leak import Audit
     from testbed.drift.quality import Quality
 

@@ -14,7 +14,7 @@ from testbed.errors import UnknownNameError
 from testbed.fusion import FILTERS, estimate
 from testbed.fusion.base import BlockFilter, EstimateBlock, diagnostic_unit
 from testbed.fusion.model_filter import ModelFilter
-from tests.contract.records import BELIEF, METHODS, NAMES, RATES, built, readings_of, sines
+from tests.contract.records import BELIEF, METHODS, NAMES, RATES, built, named, readings_of, sines
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -151,19 +151,19 @@ def test_the_number_of_readings_is_checked(name: str, readings: dict[str, FloatA
 def test_estimate_runs_the_filter(name: str, readings: dict[str, FloatArray]) -> None:
     wanted = built(name).process(readings)
     plain = {key: value.tolist() for key, value in readings.items()}
-    assert same(estimate(name, plain, sample_rate_hz=RATES), wanted)
+    assert same(estimate(named(name), plain, sample_rate_hz=RATES), wanted)
     written = METHODS[name].Parameters().model_dump(mode="json", context={"border": True}, exclude_none=True)
-    assert same(estimate(name, readings, sample_rate_hz=RATES, belief="eq39", **written), wanted)
+    assert same(estimate(named(name), readings, sample_rate_hz=RATES, belief="eq39", **written), wanted)
     with pytest.raises(ValidationError, match="colour"):
-        estimate(name, readings, sample_rate_hz=RATES, colour=1)
+        estimate(named(name), readings, sample_rate_hz=RATES, colour=1)
     if name in FILTERS:
         with pytest.raises(UnknownNameError, match=f"did you mean '{name}'"):
             estimate(name + "x", readings, sample_rate_hz=RATES)
 
 
 def test_the_order_of_the_sensors_does_not_matter(name: str, readings: dict[str, FloatArray]) -> None:
-    a = estimate(name, readings, sample_rate_hz=RATES)
-    b = estimate(name, readings, sample_rate_hz=dict(reversed(RATES.items())))
+    a = estimate(named(name), readings, sample_rate_hz=RATES)
+    b = estimate(named(name), readings, sample_rate_hz=dict(reversed(RATES.items())))
     # Only the order of the two scalar updates differs; P starts 1e8 above what they leave.
     np.testing.assert_allclose(a.rate, b.rate, rtol=0, atol=1e-7 * np.radians(1.0))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from testbed.fusion import estimate
-from tests.contract.records import DEG, METHODS, NAMES, RATES, readings_of, sines
+from tests.contract.records import DEG, METHODS, NAMES, RATES, named, readings_of, sines
 
 FULL_SCALE = {"mhd_ars": 10.0 * DEG, "mems_gyro": 500.0 * DEG}
 LENGTH, BEGIN, END = 1.5, 0.30, 0.31  # of the record and the fault [s]
@@ -30,7 +30,7 @@ def readings():
 
 @functools.cache
 def fault_free(name):
-    return estimate(name, readings()[1], sample_rate_hz=RATES)
+    return estimate(named(name), readings()[1], sample_rate_hz=RATES)
 
 
 def every_second(z, a, b, full_scale):
@@ -91,7 +91,7 @@ def estimate_with(fault, name, sensor, begin=BEGIN):
     a, b = round(begin * RATES[sensor]), round((begin + END - BEGIN) * RATES[sensor])
     fault(spoilt[sensor], a, b, FULL_SCALE[sensor])
     given = spoilt[sensor][np.isfinite(spoilt[sensor])] - readings()[1][sensor][np.isfinite(spoilt[sensor])]
-    return estimate(name, spoilt, sample_rate_hz=RATES), np.abs(given).max()
+    return estimate(named(name), spoilt, sample_rate_hz=RATES), np.abs(given).max()
 
 
 def check_sane(block):

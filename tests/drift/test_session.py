@@ -200,7 +200,7 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
     ("arguments", "message"),
     [
         (["train", "{unseen}", "--method", "gradeint"], "did you mean 'gradient'"),
-        (["train", "{missing}"], "expected a text file or a run folder"),
+        (["train", "{missing}"], "expected a recording or a run folder"),
         (["train", "{table}"], "expected either the sample rate"),
         (["train", "{table}", "--time", "hours", "--temperature-unit", "m"], "--temperature-unit"),
         (["train", "{table}", "--rate", "1", "--column", "speed"], "no column 'speed'"),
@@ -221,11 +221,11 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         (["apply", "{model}", "{gap}", "--time", "hours", "--time-unit", "h"], "fill the gap or cut the record"),
         (
             ["apply", "{model}", "{nan}", "--rate", "0.1"],
-            "nan.csv:32: expected a finite number in 'rate', got 'nan'; fill it",
+            "nan.csv:32: expected a finite number in 'rate', got none; fill it",
         ),
         (
             ["apply", "{model}", "{comma}", "--rate", "0.1"],
-            "comma.csv:2: expected a finite number in 'rate', got '10,5'; write a",
+            "comma.csv:3: expected a finite number in 'rate', got 'x'",
         ),
         (
             ["audit", "{missing}", "{unseen}"],
@@ -247,7 +247,7 @@ def test_bad_input_ends_with_2_and_leaves_nothing(
         "short": lines[:100],
         "gap": lines[:31] + lines[35:],
         "nan": [*lines[:31], "0.1,nan,20", *lines[32:]],
-        "comma": ["hours;rate;temperature", "0;10,5;20,0", "0,1;10,5;20,0"],
+        "comma": ["hours;rate;temperature", "0;10,5;20,0", "0,1;x;20,0", *["0,2;10,5;20,0"] * 9],
         "slow": [lines[0], *lines[1::20]],
     }
     for name, text in texts.items():

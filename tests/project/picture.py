@@ -73,16 +73,19 @@ WAYS = [
     (TRUTH, (395, 300), (395, 345), (620, 345), (620, 390)),
 ]
 OTHER_WAYS = {
-    "logs": (WAY, (130, 390), (130, 360), (782, 360), (782, 270), (800, 270)),
-    "pointing": (WAY, (980, 220), (1005, 220)),
-    "drift": (WAY, (270, 572), (230, 572)),
+    "logs": [
+        (WAY, (130, 390), (130, 360), (782, 360), (782, 270), (800, 270)),
+        (WAY, (130, 470), (130, 540)),
+    ],
+    "pointing": [(WAY, (980, 220), (1005, 220))],
+    "drift": [(WAY, (270, 572), (230, 572))],
 }
 
 
 def picture() -> str:
     """Return the picture as SVG."""
     there = [name for name in ROOMS if (ROOT / name / "__init__.py").exists()]
-    ways = [*WAYS, *(way for name, way in OTHER_WAYS.items() if name in there)]
+    ways = [*WAYS, *(way for name, more in OTHER_WAYS.items() if name in there for way in more)]
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif">',

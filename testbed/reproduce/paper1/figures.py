@@ -1,4 +1,4 @@
-"""The figures of paper 1, drawn at the width of a journal's column from the tables of `paper1_data`."""
+"""The figures of paper 1, drawn at the width of a journal's column from the tables of its `data`."""
 
 from __future__ import annotations
 
