@@ -12,7 +12,7 @@ from testbed.errors import ScenarioError, UnknownNameError, quoted
 from testbed.inputs.plugins import Plugins, load_plugins
 from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
-from testbed.models.turntable.turntable import TurntableParameters
+from testbed.models.turntable.parameters import TurntableParameters
 from testbed.parts import merge, preset
 from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
