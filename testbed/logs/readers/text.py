@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, fields_of, find_dialect
 from testbed.logs.options import refusal
 from testbed.logs.selection import TextOptions
@@ -127,8 +128,8 @@ class TextTable:
             kept = [row for row in raw.split(b"\n") if not row.lstrip().startswith(tuple(m.encode() for m in COMMENTS))]
             raw = b"\n".join(kept)
         if self.dialect.separator == " ":
-            raw = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", raw)
-            return re.sub(rb"[ \t]+", b" ", raw)
+            raw = re.sub(rb"[ \t]+", b" ", raw.replace(b"\r\n", b"\n")).removeprefix(b" ")
+            return raw.replace(b"\n ", b"\n").replace(b" \n", b"\n").removesuffix(b" ")
         return raw
 
     def _parse(self, content: bytes, types: dict[int, Any], line: int, raw: bytes, *, last: bool) -> Block:
@@ -212,16 +213,18 @@ class TextTable:
             return
         if kind.startswith("time"):
             if not (ISO if kind.startswith("timestamp") else CLOCK).fullmatch(field):
-                self._refuse(f"expected a time such as the first ones in {label}, got {field!r}; mend the line", line)
+                self._refuse(
+                    f"expected a time such as the first ones in {label}, got {quoted(field)}; mend the line", line
+                )
             return
         try:
             float(field.replace(",", ".") if self.dialect.decimal == "," else field)
         except ValueError:
             remedy = "write a decimal point or give --decimal ," if "," in field else "fill it or cut the record"
-            self._refuse(f"expected a finite number in {label}, got {field!r}; {remedy}", line)
+            self._refuse(f"expected a finite number in {label}, got {quoted(field)}; {remedy}", line)
         if kind == "int64" and not re.fullmatch(r"[+-]?\d+", field):
             self._refuse(
-                f"expected a whole number in {label}, as in the first rows, got {field!r}; mend the line", line
+                f"expected a whole number in {label}, as in the first rows, got {quoted(field)}; mend the line", line
             )
 
     def _refuse(self, message: str, line: int | None = None) -> NoReturn:
