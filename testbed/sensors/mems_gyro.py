@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
-from testbed.sensors.noise_terms import NoiseStage
-from testbed.signals import LinearFilter, random_stream, transfer
+from testbed.sensors.noise_terms import NoiseStage, Ramp
+from testbed.sensors.sampled_noise import Rational
+from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
 from testbed.units import Frequency, Quantity, Range
 
 if TYPE_CHECKING:
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
     from testbed.signals import ComplexArray, FloatArray
 
-# Base clock of a run, at which the noise enters.
-_INPUT_RATE_HZ = 20000.0
-
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
 Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
 
@@ -32,7 +30,8 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     """A MEMS gyro as its user sees it: readings in rad/s.
 
     One chain: true rate, constant errors, noise, low-pass, decimation filter, reading clock, dead band, range and word,
-    lost readings. The noise is added to the rate and passes the low-pass with it, as in the real chip. The low-pass is
+    lost readings. The noise is referred to the rate and passes the low-pass with it, as in the real chip; it is drawn
+    behind it, at the rate of the readings, or at the clock of the run where `fir` or `jitter` follow. The low-pass is
     given either by its coefficients or as a second order with `corner` and `damping`.
 
     Parameters
@@ -110,7 +109,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         freq = np.asarray(freq_hz, dtype=np.float64)
         numerator, denominator = self.transfer_function
         low_pass = transfer(np.array(numerator), np.array(denominator), freq)
-        clock = self.clock_response(freq, self.sample_rate, _INPUT_RATE_HZ)
+        clock = self.clock_response(freq, self.sample_rate, BASE_RATE_HZ)
         return (1.0 + self.scale_factor_error) * low_pass * clock
 
     def full_scale(self) -> float:
@@ -118,9 +117,9 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         return float(min(self.range, (2 ** (self.word_bits - 1) - 1) / self.sensitivity))
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
-        """Return the noise referred to the true rate, its terms at 20 kHz; see `Sensor.input_noise_psd`."""
+        """Return the noise referred to the true rate; see `Sensor.input_noise_psd`."""
         rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
-        terms = self.noise_psd(freq_hz, _INPUT_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
+        terms = self.noise_psd(freq_hz) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
 
@@ -129,7 +128,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         density, hour = np.rad2deg(self.angle_random_walk), np.rad2deg(3600.0)
         floor = (2.0 * np.log(2.0) / np.pi) ** 0.5
         allan = {tau: hour * self.allan_variance(tau) ** 0.5 for tau in (1.0, 100.0)}
-        delay = self.delay(self.sample_rate, _INPUT_RATE_HZ)
+        delay = self.delay(self.sample_rate, BASE_RATE_HZ)
         return [
             ("angle random walk N", f"{60.0 * density:.6g} deg/sqrt(h)"),
             ("N as root density, two-sided", f"{density:.6g} deg/s/sqrt(Hz)"),
@@ -154,10 +153,8 @@ class MemsGyroStage:
 
     def __init__(self, gyro: MemsGyro, input_rate_hz: float, seed: int, name: str) -> None:
         ratio = rate_ratio(input_rate_hz, gyro.sample_rate)
-        if isinstance(gyro.fir, tuple) and input_rate_hz != _INPUT_RATE_HZ:
-            msg = (
-                f"input_rate_hz: expected {_INPUT_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
-            )
+        if isinstance(gyro.fir, tuple) and input_rate_hz != BASE_RATE_HZ:
+            msg = f"input_rate_hz: expected {BASE_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
             raise ValueError(msg)
         self._gyro = gyro
 
@@ -165,8 +162,12 @@ class MemsGyroStage:
             return random_stream(seed, name, term)
 
         self._turn_on = gyro.turn_on_bias * stream("turn_on_bias").standard_normal() if gyro.noise else 0.0
-        self._noise = NoiseStage(gyro.noise_terms(input_rate_hz, seed, name) if gyro.noise else {})
         numerator, denominator = gyro.transfer_function
+        # Weights and ages work on the samples of the run, so their noise has to be there too.
+        self._early = gyro.fir is not None or gyro.jitter > 0.0
+        passed, rate_hz = Rational(numerator, denominator), input_rate_hz if self._early else gyro.sample_rate
+        self._noise = NoiseStage(gyro.sampled_terms(passed, rate_hz, seed, name) if gyro.noise else {})
+        self._ramp = Ramp(gyro.rate_ramp if gyro.noise else 0.0, input_rate_hz)
         self._low_pass = LinearFilter(list(numerator), list(denominator), input_rate_hz)
         self._fir = Fir(gyro.weights(ratio))
         self._decimator: Decimator | AgedSampler = Decimator(ratio)
@@ -182,8 +183,14 @@ class MemsGyroStage:
     def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]; NaN where one is lost."""
         sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
-        filtered = self._low_pass.process(sensed + self._noise.process(true_rate.size))
+        if self._gyro.rate_ramp:
+            sensed = sensed + self._ramp.process(true_rate.size)
+        filtered = self._low_pass.process(sensed)
+        if self._early:
+            filtered += self._noise.process(filtered.size)
         taken = self._decimator.process(self._fir.process(filtered))
+        if not self._early:
+            taken = taken + self._noise.process(taken.size)
         readings = self._converter.process(np.where(np.abs(taken) < self._gyro.dead_band, 0.0, taken))
         if self._gyro.noise and self._gyro.dropped:
             readings[self._losses.random(readings.size) < self._gyro.dropped] = np.nan

@@ -14,7 +14,8 @@ from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
-from testbed.sensors.noise_terms import NoiseStage, White
+from testbed.sensors.noise_terms import NoiseStage
+from testbed.sensors.sampled_noise import SampledNoise, Shape, sampled
 from testbed.signals import random_stream
 from testbed.units import Duration, Frequency, Quantity, ScaleFactor, Temperature, Voltage
 
@@ -165,9 +166,12 @@ class MhdArsStage:
         self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
-        self._johnson = NoiseStage(_johnson_terms(sensor, input_rate_hz, seed, name))
         self._gain = sensor.channel_gain
-        self._analogue = _analogue_chain(sensor, input_rate_hz)
+        self._before, self._behind = _analogue_chain(sensor, input_rate_hz)
+        # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
+        self._early = sensor.saturation is not None
+        johnson = _johnson_terms(sensor, input_rate_hz if self._early else sensor.sample_rate, seed, name)
+        self._johnson = NoiseStage(johnson if sensor.noise else {})
         self._noise = NoiseStage(sensor.noise_terms(sensor.sample_rate, seed, name) if sensor.noise else {})
         self._converter = Converter(
             sensor.resolution, sensor.adc_bits, sensor.adc_range / sensor.scale_factor, rounding=sensor.noise
@@ -175,11 +179,16 @@ class MhdArsStage:
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        slip = self._channel.process(true_rate)
-        signal = self._gain * (slip + self._johnson.process(slip.size))
-        for stage in self._analogue:
+        signal = self._gain * self._channel.process(true_rate)
+        for stage in self._before:
+            signal = stage.process(signal)
+        if self._early:
+            signal = signal + self._johnson.process(signal.size)
+        for stage in self._behind:
             signal = stage.process(signal)
         taken = self._decimator.process(signal)
+        if not self._early:
+            taken = taken + self._johnson.process(taken.size)
         return self._converter.process(taken + self._noise.process(taken.size))
 
     def profile(self) -> FloatArray:
@@ -187,16 +196,24 @@ class MhdArsStage:
         return self._channel.profile()
 
 
-def _johnson_terms(sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> dict[str, NoiseTerm]:
-    density = sensor.johnson_noise if sensor.noise else 0.0
-    return {"johnson": White(density, input_rate_hz, random_stream(seed, name, "johnson"))} if density else {}
+def _johnson_terms(sensor: MhdArs, sample_rate_hz: float, seed: int, name: str) -> dict[str, NoiseTerm]:
+    """Return the Johnson noise behind the electronics, or in front of the rails if there are any."""
+    blocks = [*sensor.before_rails(), *([] if sensor.saturation else sensor.behind_rails())]
+    passed = LowPass(corner=sensor.amplifier_pole).rational()
+    for block in blocks:
+        passed = passed.through(block.rational())
+    shape = Shape(white=sensor.channel_gain * sensor.johnson_noise)
+    if not shape.white:
+        return {}
+    return {"johnson": SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, name, "johnson"))}
 
 
-def _analogue_chain(sensor: MhdArs, input_rate_hz: float) -> list[AnalogueStage]:
-    chain: list[AnalogueStage] = [OnePole(sensor.amplifier_pole, input_rate_hz)]
-    chain += [block.start(input_rate_hz) for block in sensor.before_rails()]
+def _analogue_chain(sensor: MhdArs, input_rate_hz: float) -> tuple[list[AnalogueStage], list[AnalogueStage]]:
+    """Return the stages up to the amplifier's rails, and the others."""
+    before: list[AnalogueStage] = [OnePole(sensor.amplifier_pole, input_rate_hz)]
+    before += [block.start(input_rate_hz) for block in sensor.before_rails()]
+    behind: list[AnalogueStage] = [block.start(input_rate_hz) for block in sensor.behind_rails()]
     if sensor.saturation is not None:
         limit = sensor.saturation.limit / sensor.scale_factor
-        chain.append(SaturationStage(limit, sensor.saturation.recovery_time, input_rate_hz))
-    chain += [block.start(input_rate_hz) for block in sensor.behind_rails()]
-    return chain
+        behind.insert(0, SaturationStage(limit, sensor.saturation.recovery_time, input_rate_hz))
+    return before, behind
