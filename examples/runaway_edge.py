@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter
 
 from testbed.fusion import estimate
 from testbed.fusion.analysis.runaway import critical_q
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:

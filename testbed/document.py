@@ -6,11 +6,9 @@ import difflib
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted, shortened
+from testbed.inputs.tree import read_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 
 Model = TypeVar("Model", bound=BaseModel)
 
-_LARGEST = 1_000_000
+_MOST_FINDINGS = 100
 
 
 class Document:
@@ -36,17 +34,20 @@ class Document:
     Raises
     ------
     ScenarioError
-        If it cannot be read, is empty, binary, no mapping, or breaks YAML 1.2 (a repeated key does).
+        If it cannot be read, is empty, binary, no mapping, breaks YAML 1.2 (a repeated key does) or a limit of
+        `testbed.inputs`.
     """
 
     def __init__(self, path: Path, what: str = "scenario (name, duration, motion, sensors, ...)") -> None:
         self.file, self._what = str(path), what
         self.problems: list[Problem] = []
-        self.data = self._mapping(self._parse(self._text(path)))
+        self._tree = read_yaml(path, f"a {what.split(maxsplit=1)[0]}")
+        self.data = self._mapping(self._tree.data)
 
     def find(self, key: Key, message: str) -> None:
         """Note a problem at `key`, a path of mapping keys and list indices."""
-        self.problems.append(Problem(message, ".".join(map(str, key)), self.file, self._line(key)))
+        place = ".".join(shortened(str(step)) for step in key)
+        self.problems.append(Problem(message, place, self.file, self._tree.line(key)))
 
     def adopt(self, error: ScenarioError) -> None:
         """Take over the findings about another file, such as a recorded motion."""
@@ -54,10 +55,12 @@ class Document:
 
     def refuse(self) -> None:
         """Raise ScenarioError with everything found so far, in the order of the lines, if anything was."""
-        if self.problems:
-            raise ScenarioError(
-                sorted(self.problems, key=lambda problem: (problem.file != self.file, problem.line or 0))
-            )
+        found = sorted(self.problems, key=lambda problem: (problem.file != self.file, problem.line or 0))
+        if len(found) > _MOST_FINDINGS:
+            more = Problem(f"and {len(found) - _MOST_FINDINGS} more findings", file=self.file)
+            found = [*found[:_MOST_FINDINGS], more]
+        if found:
+            raise ScenarioError(found)
 
     def validate(self, model: type[Model], data: Any, key: Key, folder: Path) -> Model | None:
         """Validate `data`, found at `key`, as `model`; note what is wrong and return None then."""
@@ -70,28 +73,6 @@ class Document:
             self.adopt(error)
         return None
 
-    def _text(self, path: Path) -> str:
-        try:
-            if path.stat().st_size > _LARGEST:
-                self._fatal(f"expected a {self._what.split()[0]} of at most {_LARGEST} bytes")
-            text = path.read_text(encoding="utf-8-sig")
-        except UnicodeDecodeError:
-            self._fatal("expected a YAML text in UTF-8, got a binary file")
-        except OSError as error:
-            self._fatal(f"cannot be read: {error.strerror or error}")
-        return text
-
-    def _parse(self, text: str) -> Any:
-        try:
-            return YAML(typ="rt", pure=True).load(text)
-        except DuplicateKeyError as error:
-            self._fatal(str(error.problem).replace("found duplicate key", "repeated key"), error)
-        except MarkedYAMLError as error:
-            self._fatal(f"not YAML: {error.problem or error.context}", error)
-        except (YAMLError, ValueError) as error:
-            reason = str(error).splitlines()[0] if str(error) else "unreadable characters"
-            self._fatal(f"not YAML: {reason}")
-
     def _mapping(self, data: Any) -> Any:
         if data is None:
             self._fatal(f"is empty; expected a {self._what}")
@@ -99,27 +80,14 @@ class Document:
             self._fatal(f"expected a mapping, the keys of a {self._what}", line=1)
         return data
 
-    def _fatal(self, message: str, error: MarkedYAMLError | None = None, *, line: int | None = None) -> NoReturn:
-        mark = getattr(error, "problem_mark", None)
-        raise ScenarioError([Problem(message, file=self.file, line=mark.line + 1 if mark is not None else line)])
-
-    def _line(self, key: Key) -> int | None:
-        """Return the line of the deepest part of `key` that stands in the file."""
-        node, line = self.data, None
-        for step in key:
-            try:
-                position = node.lc.data[step]
-                node = node[step]
-            except (AttributeError, KeyError, IndexError, TypeError):
-                break
-            line = position[0] + 1
-        return line
+    def _fatal(self, message: str, *, line: int | None = None) -> NoReturn:
+        raise ScenarioError([Problem(message, file=self.file, line=line)])
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:
     """Return the message for a key that nothing knows."""
     names = sorted(known)
-    near = difflib.get_close_matches(key, names, n=1)
+    near = difflib.get_close_matches(shortened(key), names, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"unknown key{hint} (known: {', '.join(names)})"
 
@@ -149,7 +117,7 @@ def _message(detail: Mapping[str, Any], model: type[BaseModel]) -> str:
     reason = str(detail["msg"]).removeprefix("Value error, ")
     if kind == "value_error":
         return reason
-    return f"{reason[0].lower()}{reason[1:]}, got {detail['input']!r}"
+    return f"{reason[0].lower()}{reason[1:]}, got {quoted(detail['input'])}"
 
 
 def _known(model: type[BaseModel], loc: tuple[str | int, ...]) -> Iterable[str]:

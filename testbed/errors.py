@@ -3,11 +3,38 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+# Characters of what a user gave that a message repeats.
+MOST_QUOTED = 80
+_REPR = reprlib.Repr()
+_REPR.maxlevel, _REPR.maxstring, _REPR.maxlong, _REPR.maxother = 3, MOST_QUOTED, 40, MOST_QUOTED
+
+
+def shortened(text: str) -> str:
+    """Return a text for a message: at most 80 characters of it, the last three dots if there were more."""
+    return text if len(text) <= MOST_QUOTED else f"{text[: MOST_QUOTED - 3]}..."
+
+
+def quoted(value: Any) -> str:
+    """Return a value that a user gave as a message shows it, at most 80 characters.
+
+    Parameters
+    ----------
+    value : Any
+        However large or deep.
+    """
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return f"a whole number of {value.bit_length()} bits"
+    try:
+        return shortened(_REPR.repr(value))
+    except Exception:  # noqa: BLE001 - a user's own class may fail to describe itself
+        return f"a {shortened(type(value).__name__)}"
 
 
 @dataclass(frozen=True)
@@ -41,7 +68,7 @@ class UnknownNameError(ValueError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str], reason: str = "") -> None:
         names = sorted(known)
-        near = difflib.get_close_matches(name, names, n=1)
+        near = difflib.get_close_matches(shortened(name), names, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         hint = f": {reason}" if reason else hint
-        super().__init__(f"unknown {kind} {name!r}{hint} (known: {', '.join(names) or 'none'})")
+        super().__init__(f"unknown {kind} {quoted(name)}{hint} (known: {', '.join(names) or 'none'})")

@@ -5,6 +5,10 @@ Only where a density is meant is the cycle taken as a pure number: `nrad/s/sqrt(
 rad/sqrt(s). A temperature is absolute in `degC` and `K`; in a compound unit such as `ppm/degC` both are the same step.
 `g0` is standard gravity, `g` a gram. What data sheets and logs write is read too: `dps`, `mdps`, `deg/sec`, `deg/hr`,
 `rpm`, `mas/s`, `°/s`, `°/√h`.
+
+A unit is terms joined by `*`, `/` or a blank. A term is a symbol, `1`, a unit in brackets or `sqrt(unit)`, with an
+exponent from -9 to 9 in halves, written `**`, `^` or bare: `m/s^2`, `rad s**-0.5`, `deg/s/sqrt(Hz)`. At most 64
+characters and two levels of brackets; anything else is refused before it is worked out.
 """
 
 from __future__ import annotations
@@ -18,6 +22,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import pint
 from pydantic_core import PydanticCustomError, core_schema
+
+from testbed.errors import quoted
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
@@ -74,6 +80,24 @@ _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)\w*)\s*(.*)", re.IGNORECASE | re.DOTALL
 )
 
+_MOST_UNIT, _MOST_TEXT = 64, 256
+# Atomic, so that g0 is never g to the power of 0.
+_SYMBOL = r"(?>g0|[A-Za-zµμ]+|%)"
+_POWER = r"[+-]?(?:9(?:\.0)?|[0-8](?:\.[05])?)"
+_RAISED = r"(?:\s*(?:\*\*|\^)\s*)?"
+
+
+def _product(atom: str) -> str:
+    """Return the pattern of terms, which are 1 or an atom with its exponent, joined."""
+    term = rf"(?:1|{atom}(?:{_RAISED}{_POWER})?)"
+    return rf"\s*{term}(?:(?:\s*[*/]\s*|\s+){term})*\s*"
+
+
+_INNER = _product(rf"(?:{_SYMBOL}|(?:sqrt)?\({_product(_SYMBOL)}\))")
+_UNIT = re.compile(_product(rf"(?:{_SYMBOL}|(?:sqrt)?\({_INNER}\))"), re.ASCII)
+_EXPONENT = re.compile(rf"({_SYMBOL}|\)){_RAISED}({_POWER})", re.ASCII)
+_ROOT = re.compile(r"sqrt(\((?:[^()]|\([^()]*\))*\))")
+
 
 @functools.cache
 def _registry() -> pint.UnitRegistry:
@@ -82,25 +106,36 @@ def _registry() -> pint.UnitRegistry:
     return registry
 
 
-@functools.cache
+@functools.lru_cache(4096)
 def _factor(unit: str, si: str, *, cycle_is_number: bool) -> float:
     """Return the factor from `unit` to `si`; ValueError with the expectation if the dimensions differ."""
+    if len(unit) > _MOST_UNIT:
+        msg = f"expected a unit of at most {_MOST_UNIT} characters, got {len(unit)}"
+        raise ValueError(msg)
     registry = _registry()
-    text = unit.replace("^", "**").replace("%", "percent")
-    text = re.sub(r"sqrt\(([^()]*)\)", r"((\1)**0.5)", text)
     try:
-        given = registry.Quantity(1.0, registry.parse_units(text)).to_base_units()
+        given = registry.Quantity(1.0, registry.parse_units(_expression(unit))).to_base_units()
     except Exception as error:
-        msg = f"unit {unit!r} is not understood"
+        msg = f"unit {quoted(unit)} is not understood"
         raise ValueError(msg) from error
     wanted = registry.Quantity(1.0, registry.parse_units(si.replace("^", "**") if si else "")).to_base_units()
     have, want = dict(given.dimensionality), dict(wanted.dimensionality)
     if cycle_is_number:
         have.pop("[cycle]", None)
     if have.keys() != want.keys() or any(not math.isclose(have[k], want[k]) for k in want):
-        msg = f"{unit!r} has the wrong dimension"
+        msg = f"{quoted(unit)} has the wrong dimension"
         raise ValueError(msg)
     return float(given.magnitude / wanted.magnitude)
+
+
+def _expression(unit: str) -> str:
+    """Return a unit of the grammar as the library of units takes it; ValueError if it is none."""
+    if not _UNIT.fullmatch(unit):
+        raise ValueError(unit)
+    text = _EXPONENT.sub(r"\1**\2", unit).replace("%", "percent")
+    while _ROOT.search(text):
+        text = _ROOT.sub(r"(\1**0.5)", text)
+    return text
 
 
 def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = False) -> float:
@@ -128,27 +163,30 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
         If the number, the unit or the dimension is wrong; NaN and infinity are refused.
     """
     expected = _expectation(si, example)
+    if len(text) > _MOST_TEXT:
+        msg = f"{expected}, got a text of {len(text)} characters"
+        raise ValueError(msg)
     match = _NUMBER.fullmatch(text)
     if match is None:
-        msg = f"{expected}, got {text!r}"
+        msg = f"{expected}, got {quoted(text)}"
         raise ValueError(msg)
     number, unit = float(match[1]), _plain(match[2].strip())
     if not math.isfinite(number):
-        msg = f"{expected}, got {text!r}, which is not finite"
+        msg = f"{expected}, got {quoted(text)}, which is not finite"
         raise ValueError(msg)
     if not unit and si:
-        msg = f"{expected}, got {text!r}: the unit is missing"
+        msg = f"{expected}, got {quoted(text)}: the unit is missing"
         raise ValueError(msg)
     try:
         value = number * _factor(unit, si, cycle_is_number=cycle_is_number) if unit else number
     except ValueError as error:
-        msg = f"{expected}, got {text!r}: {error}"
+        msg = f"{expected}, got {quoted(text)}: {error}"
         raise ValueError(msg) from error
     if (unit, si) == ("degC", "K"):
         # In decimals, so that 25 degC and 298.15 K are the same bits.
         value = float(Decimal(match[1]) + _ICE_POINT)
     if not math.isfinite(value):
-        msg = f"{expected}, got {text!r}, which is not finite"
+        msg = f"{expected}, got {quoted(text)}, which is not finite"
         raise ValueError(msg)
     return value
 
@@ -204,13 +242,17 @@ class Quantity:
     def _read(self, value: Any, *, border: bool) -> float:
         if isinstance(value, str):
             return parse(value, self.unit, example=self.example, cycle_is_number=self.cycle_is_number)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            msg = f"{_expectation(self.unit, self.example)}, got {value!r}"
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
+            msg = f"{_expectation(self.unit, self.example)}, got {quoted(value)}"
             raise ValueError(msg)
         if border and self.unit:
-            msg = f"expected a quantity in {self.unit}, such as {self.example!r}, got {value!r}: the unit is missing"
+            msg = f"{_expectation(self.unit, self.example)}, got {quoted(value)}: the unit is missing"
             raise ValueError(msg)
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError as error:
+            msg = f"{_expectation(self.unit, self.example)}, got {quoted(value)}"
+            raise ValueError(msg) from error
 
     def _bound(self, si: float, value: Any) -> None:
         checks = (
@@ -220,7 +262,7 @@ class Quantity:
         )
         for failed, bound in checks:
             if failed:
-                msg = f"expected {bound} {self.unit}, got {value!r}"
+                msg = f"expected {bound} {self.unit}, got {quoted(value)}"
                 raise ValueError(msg)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:

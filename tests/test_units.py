@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -115,6 +116,125 @@ def test_parse_refuses_what_is_not_finite(text):
 def test_parse_refuses_nonsense_and_says_what_was_expected(text):
     with pytest.raises(ValueError, match=r"expected a quantity in rad/s, such as '1 deg/s'"):
         parse(text, "rad/s", example="1 deg/s")
+
+
+# Symbols with their size in SI and their dimension (length, time, angle), by hand: the oracle of the grammar.
+SYMBOLS = {
+    "m": (1.0, 1, 0, 0),
+    "mm": (1e-3, 1, 0, 0),
+    "s": (1.0, 0, 1, 0),
+    "h": (3600.0, 0, 1, 0),
+    "rad": (1.0, 0, 0, 1),
+    "deg": (DEG, 0, 0, 1),
+}
+HALVES = [i / 2 for i in range(-6, 7) if i]
+
+
+def raised(unit, power):
+    return (unit[0] ** power, *(d * power for d in unit[1:]))
+
+
+def powers(atom):
+    """Return (text, value) of an atom, or of it to a power, in each way of writing that."""
+    written = st.sampled_from(["**", "^", " ^ ", ""])
+    return st.one_of(
+        atom,
+        st.tuples(atom, st.sampled_from(HALVES), written).map(
+            lambda p: (f"{p[0][0]}{p[2]}{p[1]:g}", raised(p[0][1], p[1]))
+        ),
+    )
+
+
+def product_of(atom):
+    def join(terms):
+        text, value = terms[0][1]
+        for sign, (other, factor) in terms[1:]:
+            text, power = f"{text}{sign}{other}", -1.0 if "/" in sign else 1.0
+            value = (
+                value[0] * factor[0] ** power,
+                *(a + power * b for a, b in zip(value[1:], factor[1:], strict=True)),
+            )
+        return text, value
+
+    terms = st.tuples(st.sampled_from(["*", "/", " ", " / ", "  "]), powers(atom))
+    return st.lists(terms, min_size=1, max_size=3).map(join)
+
+
+def bracketed(inner):
+    root = inner.map(lambda p: (f"sqrt({p[0]})", raised(p[1], 0.5)))
+    return st.one_of(inner.map(lambda p: (f"({p[0]})", p[1])), root)
+
+
+symbol = st.sampled_from(list(SYMBOLS)).map(lambda name: (name, SYMBOLS[name]))
+flat = product_of(symbol)
+one_level = product_of(st.one_of(symbol, bracketed(flat)))
+two_levels = product_of(st.one_of(symbol, bracketed(one_level)))
+
+
+@pytest.mark.property
+@given(two_levels)
+def test_parse_of_any_unit_of_the_grammar_is_its_product(unit):
+    """The factor by an evaluation of its own: at most 30 factors to the power of 9/2, each off by some eps."""
+    text, (size, *dimension) = unit
+    assume(len(text) <= 64)
+    assume(1e-200 < size < 1e200)
+    si = "*".join(f"{name}^{power:g}" for name, power in zip(("m", "s", "rad"), dimension, strict=True) if power) or "1"
+    assume(all(abs(power) <= 9 for power in dimension))
+    if si == "1":
+        return
+    assert parse(f"3 {text}", si) == pytest.approx(3.0 * size, rel=1e-12)
+
+
+@pytest.mark.property
+@given(
+    two_levels,
+    st.sampled_from(
+        [
+            "({})**9**9",
+            "{}^10",
+            "{}^-9.5",
+            "{}^0.3",
+            "({}",
+            "{})",
+            "((({})))",
+            "{}//s",
+            "{}*",
+            "{} 2",
+            "{}^s",
+            "{}+s",
+            "{}.s",
+            "{},s",
+            "{}²",
+        ]
+    ),
+)
+def test_parse_refuses_a_unit_beside_the_grammar(unit, damage):
+    """One level more than a text with two levels has, a power of a power, a number: refused before it is worked out."""
+    text = damage.format(unit[0])
+    assume(text.count("(") == 0 or damage != "((({})))" or "(" in unit[0])
+    begin = time.monotonic()
+    with pytest.raises(ValueError, match=r"not understood|at most 64 characters|wrong dimension"):
+        parse(f"1 {text}", "kg")
+    assert time.monotonic() - begin < 1.0
+
+
+@pytest.mark.parametrize(
+    "unit",
+    ["s**9**9**9", "s" * 100_000, "(" * 30 + "s" + ")" * 30, "s " * 50_000, "s*" * 31 + "!", "(s s " * 12, "9" * 5000],
+    ids=["tower", "long", "deep", "terms", "end", "open", "digits"],
+)
+def test_parse_refuses_a_hostile_unit_at_once_with_a_short_message(unit):
+    begin = time.monotonic()
+    with pytest.raises(ValueError, match="expected a quantity in s") as caught:
+        parse(f"1 {unit}", "s")
+    assert time.monotonic() - begin < 1.0
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**5000), 2**1023 * 2], ids=["400", "5000", "first"])
+def test_quantity_refuses_a_whole_number_beyond_a_float(value):
+    with pytest.raises(ValidationError, match="expected a quantity in Hz"):
+        Sine(frequency=value, rate=0.1)
 
 
 @pytest.mark.property

@@ -91,6 +91,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         folder = stack.enter_context(RunFolder(out))
         reach = stack.enter_context(failing_as_run_error(str(out)))
         check_interrupt = stack.enter_context(held_interrupts())
+        scenario = scenario.kept_in(folder.path)
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain.rates, chain.step)
         attributes = {
@@ -123,10 +124,10 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         netcdf.close()
         recording.close()
         write_metrics(folder.path, {**judge.metrics(), "versions": versions()})
-        write_scenario(folder.path, scenario.resolved(), versions())
+        write_scenario(folder.path, scenario.resolved(folder.path), versions())
         write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish())
+        return open_run(folder.finish({"versions": versions()}))
 
 
 def versions() -> dict[str, str]:

@@ -10,7 +10,7 @@ from testbed.drift.figures import allan_figure, drift_figure, gain_figure
 from testbed.drift.summary import summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.pages.template import render
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from testbed.drift.leak import audit
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.records import Columns, ThermalRecord, check_options, read
 from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.runs.folder import failing_as_run_error, write_text
+from testbed.runs.atomic import write_text
+from testbed.runs.folder import failing_as_run_error
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:

@@ -235,7 +235,8 @@ def write_figure(figure: Figure, path: Path) -> Path:
     RunError
         If it cannot be written.
     """
-    from testbed.runs.folder import failing_as_run_error, write_bytes
+    from testbed.runs.atomic import write_bytes
+    from testbed.runs.folder import failing_as_run_error
 
     kind = figure_format(path)
     buffer = io.BytesIO()

@@ -13,6 +13,8 @@ from testbed.signals import FloatArray, sample_times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
+    from typing import Self
 
 RateFunction = Callable[[FloatArray], FloatArray]
 
@@ -31,6 +33,18 @@ class Motion(Part):
             For terms that are realisations of a random process.
         """
         raise NotImplementedError
+
+    def kept_in(self, folder: Path, name: str) -> Self:
+        """Return the term with the file that it reads, if it reads one, copied to `folder`.
+
+        Parameters
+        ----------
+        folder : Path
+            Where to.
+        name : str
+            Of the copy, without its ending.
+        """
+        return self
 
     def lines(self) -> tuple[float, ...]:
         """Return the frequencies [Hz] at which gain and phase are reported; empty for motions without lines."""

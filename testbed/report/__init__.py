@@ -13,7 +13,7 @@ from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
-from testbed.runs.folder import write_text
+from testbed.runs.manifest import rewrite
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ def write_report(run_dir: Path) -> Path:
     """Write ``report.html`` from ``run.nc``, ``metrics.json`` and ``scenario.yaml`` of a finished run folder.
 
     Signals are read in blocks, so that memory does not grow with the duration. The page is written beside and renamed:
-    an earlier one stays whole until the new one is.
+    an earlier one stays whole until the new one is. The folder's manifest follows it.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def write_report(run_dir: Path) -> Path:
     scenario = read_text(run_dir / "scenario.yaml", "the resolved scenario (YAML text)")
     with open_run(run_dir / "run.nc") as data:
         digest = digest_run(data, metrics)
-    write_text(run_dir / REPORT, _render(metrics, scenario, digest))
+    rewrite(run_dir, REPORT, _render(metrics, scenario, digest))
     return run_dir / REPORT
 
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from testbed.pages.numbers import decade, plain
 from testbed.pages.svg import INK, STYLE
-from testbed.runs.folder import write_bytes
+from testbed.runs.atomic import write_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,19 +1,23 @@
-"""The run folder: written beside its place, then renamed, so that it appears whole or not at all."""
+"""The run folder: written beside its place, then exchanged, so that it appears whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import json
-import shutil
-import tempfile
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import h5py
 from ruamel.yaml import YAML
 
 from testbed.errors import Problem, RunError, ScenarioError
+from testbed.runs.atomic import put, sync_tree, write_text
+from testbed.runs.leftovers import beside, heal
+from testbed.runs.manifest import MANIFEST, read_manifest, strangers, write_manifest
 from testbed.runs.results import Run, Signals, assemble
 
 if TYPE_CHECKING:
@@ -26,74 +30,84 @@ ESSENTIAL = ("scenario.yaml", "run.nc", "metrics.json")
 
 
 class RunFolder:
-    """A run folder in the making; leaving the context without `finish` removes all traces.
+    """A run folder in the making: it replaces an earlier one in one step, or leaves no trace.
 
     Parameters
     ----------
     target : Path
-        Where the folder will appear. An earlier run folder there is replaced whole.
+        Where the folder will appear, a link's target if it is one. An earlier run folder there is replaced, but for
+        one that holds anything that its manifest does not list.
 
     Raises
     ------
     ScenarioError
-        If something else is there, or the place cannot be written.
+        From the context's start: if something else is there, or the place cannot be written.
     """
 
     def __init__(self, target: Path) -> None:
         self.target = target.absolute()
-        self._finished = False
-        if self.target.exists() and not is_replaceable(self.target):
-            msg = "exists and is no run folder of the testbed: choose another --out, or remove it yourself"
-            raise ScenarioError([Problem(msg, file=str(target))])
-        try:
-            self.target.parent.mkdir(parents=True, exist_ok=True)
-            self.path = Path(
-                tempfile.mkdtemp(prefix=f".{self.target.name}.", suffix=".partial", dir=self.target.parent)
-            )
-            self.path.chmod(0o755)
-        except OSError as error:
-            raise ScenarioError(
-                [Problem(f"cannot be written: {error.strerror or error}; choose another --out", file=str(target))]
-            ) from error
+        self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
+        try:
+            self._place = Path(os.path.realpath(self.target))
+            heal(self._place)
+            if found := in_the_way(self._place):
+                raise ScenarioError([Problem(f"{found}: choose another --out, or move it away", file=str(self.target))])
+            self._place.parent.mkdir(parents=True, exist_ok=True)
+            self.path = self._stack.enter_context(beside(self._place, folder=True)) / "run"
+            self.path.mkdir()
+        except OSError as error:
+            self._stack.close()
+            msg = f"cannot be written: {error.strerror or error}; choose another --out"
+            raise ScenarioError([Problem(msg, file=str(self.target))]) from error
         return self
 
     def __exit__(self, *_: object) -> None:
-        if not self._finished:
-            shutil.rmtree(self.path, ignore_errors=True)
+        self._stack.close()
 
-    def finish(self) -> Path:
-        """Put the folder in its place."""
-        if self.target.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{self.target.name}.", suffix=".old", dir=self.target.parent))
-            self.target.rename(old / "run")
-            self.path.rename(self.target)
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            self.path.rename(self.target)
-        self._finished = True
+    def finish(self, about: Mapping[str, Any] = MappingProxyType({})) -> Path:
+        """Write the manifest and put the folder in its place.
+
+        Parameters
+        ----------
+        about : mapping, optional
+            What the manifest says beside the list of files.
+
+        Raises
+        ------
+        RunError
+            If something else has come to lie there meanwhile; the run is kept beside it.
+        """
+        write_manifest(self.path, about)
+        sync_tree(self.path)
+        found = in_the_way(self._place)
+        if found:
+            self._keep(found)
+        put(self.path, self._place)
         return self.target
 
-
-def is_replaceable(path: Path) -> bool:
-    """Return whether `path` is an earlier run folder or an empty folder."""
-    return path.is_dir() and (all((path / name).is_file() for name in ESSENTIAL) or not any(path.iterdir()))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
-    write_bytes(path, text.encode())
+    def _keep(self, found: str) -> NoReturn:
+        others = (self._place.with_name(f"{self._place.name}.{i}") for i in itertools.count(2))
+        free = next(other for other in others if not other.exists())
+        put(self.path, free)
+        msg = f"{self.target}: {found}, since the run began; the finished run is in {free}"
+        raise RunError(msg)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f".{path.name}.partial")
-    try:
-        beside.write_bytes(content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+def in_the_way(place: Path) -> str:
+    """Return what forbids to put a run folder at `place`, nothing if it may be."""
+    if not os.path.lexists(place):
+        return ""
+    if not place.is_dir():
+        return "exists and is no run folder of the testbed"
+    if place.is_mount():
+        return "is a mounted file system, which cannot be replaced (a folder inside it can)"
+    found = strangers(place)
+    if found and read_manifest(place) is None:
+        return f"exists and is no run folder of the testbed (it has no {MANIFEST})"
+    shown = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+    return f"holds what its {MANIFEST} does not list, or not as it is now: {shown}" if found else ""
 
 
 def write_metrics(folder: Path, metrics: dict[str, Any]) -> None:
@@ -150,6 +164,7 @@ def open_run(folder: str | Path) -> Run:
         If it is no run folder.
     """
     path = Path(folder)
+    heal(path)
     missing = [name for name in ESSENTIAL if not (path / name).is_file()]
     if missing:
         msg = f"expected a run folder, but {', '.join(missing)} is missing"

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, unknown_key
-from testbed.errors import UnknownNameError
+from testbed.errors import UnknownNameError, quoted
 from testbed.fusion import FILTERS
-from testbed.fusion.belief import load_belief
+from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable.turntable import TurntableParameters
 from testbed.parts import merge, preset, resolve
@@ -20,7 +20,6 @@ from testbed.sensors import SENSORS
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from testbed.fusion.belief import SensorBelief
     from testbed.models.motion import Motion
     from testbed.sensors.base import Sensor
 
@@ -87,7 +86,7 @@ class _Reader:
         if data is None:
             return {}
         if not isinstance(data, dict):
-            self._doc.find(key, f"expected a mapping, got {data!r}")
+            self._doc.find(key, f"expected a mapping, got {quoted(data)}")
             return {}
         return data
 
@@ -123,7 +122,7 @@ class _Reader:
 
     def _term(self, item: Any, key: tuple[str | int, ...]) -> tuple[str, Motion] | None:
         if not isinstance(item, dict) or len(item) != 1:
-            self._doc.find(key, f"expected one motion with its parameters, such as 'sine: {{...}}', got {item!r}")
+            self._doc.find(key, f"expected one motion with its parameters, such as 'sine: {{...}}', got {quoted(item)}")
             return None
         kind, parameters = next(iter(item.items()))
         try:
@@ -146,9 +145,10 @@ class _Reader:
             )
             if merged is None:
                 continue
-            self._presets["sensors"][name] = merged
-            kind = str(merged.get("type", name))
-            merged = {k: v for k, v in merged.items() if k != "type"}
+            self._presets["sensors"][name] = dict(merged)
+            kind = self._type(merged.pop("type", name), key)
+            if kind is None:
+                continue
             types[name] = kind
             try:
                 model = resolve("sensor", kind, SENSORS)
@@ -173,8 +173,10 @@ class _Reader:
     def _filter(
         self, name: str, entry: dict[str, Any], types: Mapping[str, str], key: tuple[str | int, ...]
     ) -> FilterSpec | None:
-        kind = str(entry.pop("type", name))
+        kind = self._type(entry.pop("type", name), key)
         believed = entry.pop("belief", "eq39")
+        if kind is None:
+            return None
         try:
             factory = resolve("filter", kind, FILTERS)
             belief = self._belief(believed, types, key)
@@ -191,10 +193,8 @@ class _Reader:
         self, believed: Any, types: Mapping[str, str], key: tuple[str | int, ...]
     ) -> Mapping[str, SensorBelief] | None:
         """Return what the filter believes of each sensor: by the sensor's name, or else by its type."""
-        try:
-            known = load_belief(believed)
-        except (UnknownNameError, ValueError) as error:
-            self._doc.find((*key, "belief"), str(error))
+        known = self._known_belief(believed, (*key, "belief"))
+        if known is None:
             return None
         belief = {}
         for name, kind in types.items():
@@ -207,6 +207,31 @@ class _Reader:
             belief[name] = entry
         return belief
 
+    def _known_belief(self, believed: Any, key: tuple[str | int, ...]) -> Mapping[str, SensorBelief] | None:
+        """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
+        if isinstance(believed, str):
+            try:
+                return load_belief(believed)
+            except UnknownNameError as error:
+                self._doc.find(key, str(error))
+                return None
+        if not isinstance(believed, dict):
+            self._doc.find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(believed)}")
+            return None
+        read = {
+            str(name): self._doc.validate(SensorBelief, value, (*key, name), self._folder)
+            for name, value in believed.items()
+        }
+        known = {name: one for name, one in read.items() if one is not None}
+        return known if len(known) == len(read) else None
+
+    def _type(self, given: Any, key: tuple[str | int, ...]) -> str | None:
+        """Return the name of a part's kind; None, with the finding noted, if it is no name."""
+        if isinstance(given, str):
+            return given
+        self._doc.find((*key, "type"), f"expected a name, got {quoted(given)}")
+        return None
+
     def _expect(self, data: Any) -> tuple[Bound, ...]:
         bounds = []
         for subject, metrics in self._mapping(data, ("expect",)).items():
@@ -215,13 +240,15 @@ class _Reader:
                 try:
                     bounds.append(Bound(str(subject), str(metric), *_relation(match)))
                 except ValueError:
-                    self._doc.find(("expect", subject, metric), f"expected a bound such as '< 0.0143', got {text!r}")
+                    self._doc.find(
+                        ("expect", subject, metric), f"expected a bound such as '< 0.0143', got {quoted(text)}"
+                    )
         return tuple(bounds)
 
     def _good_name(self, name: Any, key: tuple[str | int, ...]) -> bool:
         if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
             return True
-        self._doc.find(key, f"expected a name of letters, digits and underscores, got {name!r}")
+        self._doc.find(key, f"expected a name of letters, digits and underscores, got {quoted(name)}")
         return False
 
 

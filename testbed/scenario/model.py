@@ -15,6 +15,7 @@ from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     from testbed.fusion.belief import SensorBelief
     from testbed.models.motion import Motion
@@ -172,12 +173,23 @@ class Scenario:
         """Return the same scenario under another seed."""
         return replace(self, frame=self.frame.model_copy(update={"seed": seed}))
 
-    def resolved(self) -> dict[str, Any]:
-        """Return the whole scenario as a mapping with SI units, which loads to the same scenario again."""
+    def kept_in(self, folder: Path) -> Scenario:
+        """Return the same scenario with the files that its motion reads copied to `folder`: it needs no others."""
+        kept = tuple((kind, motion.kept_in(folder, f"motion_{i}")) for i, (kind, motion) in enumerate(self.motion))
+        return replace(self, motion=kept)
+
+    def resolved(self, folder: Path | None = None) -> dict[str, Any]:
+        """Return the whole scenario as a mapping with SI units, which loads to the same scenario again.
+
+        Parameters
+        ----------
+        folder : Path, optional
+            Where it will stand: paths into it are relative.
+        """
         return {
             **dump(self.frame),
             "turntable": dump(self.turntable),
-            "motion": [{kind: dump(motion)} for kind, motion in self.motion],
+            "motion": [{kind: dump(motion, folder)} for kind, motion in self.motion],
             "sensors": {
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
@@ -189,11 +201,18 @@ class Scenario:
         }
 
 
-def dump(part: BaseModel) -> dict[str, Any]:
+def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
     """Return a part as a mapping with SI units that validates to the same part; what is unset by default and unset here
     is left out.
+
+    Parameters
+    ----------
+    part : BaseModel
+        The part.
+    folder : Path, optional
+        Paths into it are relative.
     """
-    written = part.model_dump(mode="json", context={"border": True})
+    written = part.model_dump(mode="json", context={"border": True, "folder": folder})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
 

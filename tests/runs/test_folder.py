@@ -10,7 +10,8 @@ import xarray as xr
 
 import testbed
 from testbed.errors import RunError, ScenarioError
-from testbed.runs.folder import ESSENTIAL, RunFolder, failing_as_run_error, open_run, write_metrics, write_text
+from testbed.runs.atomic import write_text
+from testbed.runs.folder import ESSENTIAL, RunFolder, failing_as_run_error, open_run, write_metrics
 from testbed.scenario.loader import load_scenario
 from tests.chain.test_pipeline import signals
 from tests.scenes import short
@@ -25,7 +26,7 @@ def stored(tmp_path_factory):
 
 def test_run_folder_is_complete_and_alone(stored):
     _, run, folder = stored
-    assert {p.name for p in run.folder.iterdir()} == {*ESSENTIAL, "recording.rrd", "report.html"}
+    assert {p.name for p in run.folder.iterdir()} == {*ESSENTIAL, "manifest.json", "recording.rrd", "report.html"}
     assert {p.name for p in folder.iterdir()} == {"run", "short.yaml"}
 
 
@@ -104,10 +105,9 @@ def test_the_stored_scenario_runs_again_to_the_same_bits(stored):
 def test_an_earlier_run_folder_is_replaced_whole(tmp_path):
     scenario, out = short(tmp_path), tmp_path / "run"
     testbed.run(scenario, out=out)
-    (out / "note.txt").write_text("old")
     testbed.run(scenario, out=out, seed=5)
-    assert not (out / "note.txt").exists()
     assert open_run(out).metrics["seed"] == 5
+    assert {p.name for p in tmp_path.iterdir()} == {"run", "short.yaml"}
 
 
 def test_an_empty_folder_is_taken_and_anything_else_is_refused(tmp_path):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import hashlib
+import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
 from scipy.interpolate import CubicSpline
 
 from testbed import units
@@ -58,6 +60,9 @@ class Recorded(Motion):
         The CSV file; relative to the scenario.
     time, rate : Column
         Name and unit of both columns.
+    sha256 : str, optional
+        SHA-256 of the file, in hexadecimal; a file that has another is refused. A run folder holds the file itself and
+        gives it.
 
     Raises
     ------
@@ -68,6 +73,20 @@ class Recorded(Motion):
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column
     rate: Column
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+
+    @field_serializer("file")
+    def _from_folder(self, file: Path, info: FieldSerializationInfo) -> str:
+        """Write the path from the folder on that the scenario will stand in, if the file lies in it."""
+        folder = (info.context or {}).get("folder")
+        return str(file.relative_to(folder) if folder and file.is_relative_to(folder) else file)
+
+    def kept_in(self, folder: Path, name: str) -> Self:
+        """Return the term that reads a copy of its file in `folder`, and nothing else than that."""
+        content = self._content()
+        copy = folder / f"{name}{self.file.suffix}"
+        copy.write_bytes(content)
+        return self.model_copy(update={"file": copy, "sha256": hashlib.sha256(content).hexdigest()})
 
     @model_validator(mode="after")
     def _units(self) -> Self:
@@ -101,11 +120,10 @@ class Recorded(Motion):
         lines: list[int] = []
         rows: list[tuple[float, float]] = []
         try:
-            with self.file.open(newline="", encoding="utf-8-sig") as stream:
-                for line, pair in self._rows(stream):
-                    lines.append(line)
-                    rows.append(pair)
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
+            for line, pair in self._rows(io.StringIO(self._content().decode("utf-8-sig"), newline="")):
+                lines.append(line)
+                rows.append(pair)
+        except (UnicodeDecodeError, csv.Error) as error:
             self._refuse(f"cannot be read: {error}")
         if len(rows) < 4:
             self._refuse(f"expected at least 4 samples, got {len(rows)}")
@@ -122,6 +140,16 @@ class Recorded(Motion):
                 lines[i + 1],
             )
         return t, rate
+
+    def _content(self) -> bytes:
+        try:
+            content = self.file.read_bytes()
+        except OSError as error:
+            self._refuse(f"cannot be read: {error}")
+        found = hashlib.sha256(content).hexdigest()
+        if self.sha256 not in {None, found}:
+            self._refuse(f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since")
+        return content
 
     def _rows(self, stream: Any) -> Iterator[tuple[int, tuple[float, float]]]:
         reader = csv.DictReader(stream)

@@ -15,7 +15,7 @@ from testbed.judging.budget import signal_optima
 from testbed.metrics.errors import ErrorMetrics, floor_rmse
 from testbed.reproduce.paper1.defects import table_ii_defects
 from testbed.reproduce.paper1.runs import BASE_HZ, FILTERS, SIGNALS, Protocol, errors, outputs, presets, truth
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 from testbed.signals import sample_times
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.reproduce.paper1.runs import FILTERS, Protocol, errors, outputs, presets
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

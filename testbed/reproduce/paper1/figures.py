@@ -25,7 +25,7 @@ from testbed.reproduce.drawing import (
 )
 from testbed.reproduce.paper1.data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
 from testbed.reproduce.paper1.runs import DEG, FILTERS, SENSORS
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

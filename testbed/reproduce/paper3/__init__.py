@@ -26,7 +26,7 @@ from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
 from testbed.reproduce.paper3.page import page
-from testbed.runs.folder import write_text
+from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
 
