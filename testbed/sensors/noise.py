@@ -201,10 +201,10 @@ class GyroTerms(Part):
         Returns
         -------
         dict of str to NoiseTerm
-            In the order of addition, each on the stream ``(*names, term)``.
+            In the order of addition, each on the stream ``(*names, term, "sampled")``.
         """
         return {
-            term: SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, *names, term))
+            term: SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, *names, term, "sampled"))
             for term, shape in self.shapes().items()
         }
 
