@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline changes clean
+.PHONY: run view test lint bench baseline changes readme clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -24,9 +24,9 @@ run: .venv/installed
 	$(BIN)/testbed run $(SCENARIO)
 
 view: .venv/installed
-	@last=$$(ls -1dt runs/*/ 2>/dev/null | head -n 1); \
+	@last=$$(ls -1t runs/*/recording.rrd 2>/dev/null | head -n 1); \
 	if [ -z "$$last" ]; then echo "no run yet: type 'make run' first" >&2; exit 2; fi; \
-	$(BIN)/testbed view "$$last"
+	$(BIN)/testbed view "$${last%/*}"
 
 lint: .venv/installed-test
 	$(BIN)/ruff check .
@@ -42,6 +42,10 @@ bench: .venv/installed-test
 # Rewrites the stored error-against-frequency curves; say in the commit why they moved.
 baseline: .venv/installed-test
 	$(BIN)/python -m tests.regression.error_vs_frequency
+
+# The table of commands in README.md.
+readme: .venv/installed-test
+	$(BIN)/python -m tests.project.readme
 
 # What the next release says, from the files in changes/; without --draft it goes into CHANGELOG.md and they go away.
 changes: .venv/installed-test

@@ -62,7 +62,8 @@ def thresholds(levels: dict[str, np.ndarray]) -> dict[str, tuple[float, float]]:
 def bands_file(levels: dict[str, np.ndarray]) -> str:
     """Return the text of the file of bands: two digits, as the scatter of N_k allows."""
     lines = [
-        "# Written by examples/calibrate_bands.py: N_k / dT at the band edges of a stepped sine of 1 deg/s,",
+        f"# N_k / dT of {' and '.join(PRESETS.values())} at the band edges of a stepped sine of 1 deg/s.",
+        "# Written by examples/calibrate_bands.py:",
         (
             f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and "
             f"{EDGES_HZ[1]:g} Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:"

@@ -43,7 +43,8 @@ def identified() -> dict[str, Identified]:
 def belief_file() -> str:
     """Return the text of the belief file."""
     lines = [
-        "# Written by examples/identify_beliefs.py from the responses of the presets; s in rad/s, highest power first."
+        f"# What fits the responses of the presets {' and '.join(preset for preset, _ in SENSORS.values())}.",
+        "# Written by examples/identify_beliefs.py; s in rad/s, highest power first.",
     ]
     for name, fit in identified().items():
         lines.append(

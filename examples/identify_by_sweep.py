@@ -93,10 +93,8 @@ def identified(seed: int = SEED) -> dict[str, Identified]:
 def belief_file(seed: int = SEED) -> str:
     """Return the text of the belief file."""
     lines = [
-        (
-            "# Written by examples/identify_by_sweep.py from a stepped sine of 1 deg/s with noise on; equation (39)'s "
-            "forms, s in rad/s, highest first."
-        )
+        "# Equation (39)'s forms, identified from a stepped sine of 1 deg/s with noise on.",
+        "# Written by examples/identify_by_sweep.py; s in rad/s, highest power first.",
     ]
     for name, fit in identified(seed).items():
         lines.append(

@@ -15,12 +15,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from testbed._version import __version__
-from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from testbed.chain.runner import run
-    from testbed.runs.folder import open_run
-    from testbed.runs.results import Run
+    from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
+    from testbed.notebook import Run, open_run
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
 
@@ -38,10 +37,14 @@ __all__ = [
 ]
 
 _LAZY = {
-    "Run": "testbed.runs.results",
+    "Problem": "testbed.errors",
+    "Run": "testbed.notebook",
+    "RunError": "testbed.errors",
     "Scenario": "testbed.scenario.model",
+    "ScenarioError": "testbed.errors",
+    "UnknownNameError": "testbed.errors",
     "load_scenario": "testbed.scenario.loader",
-    "open_run": "testbed.runs.folder",
+    "open_run": "testbed.notebook",
     "run": "testbed.chain.runner",
 }
 

@@ -58,6 +58,9 @@ class ScenarioError(ValueError):
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[ScenarioError], tuple[list[Problem]]]:
+        return type(self), (self.problems,)
+
 
 class RunError(RuntimeError):
     """The run failed after it started (diverged, saturated, disk full); says how far it got."""
@@ -68,7 +71,11 @@ class UnknownNameError(ValueError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str], reason: str = "") -> None:
         names = sorted(known)
+        self._given = (kind, name, names, reason)
         near = difflib.get_close_matches(shortened(name), names, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         hint = f": {reason}" if reason else hint
         super().__init__(f"unknown {kind} {quoted(name)}{hint} (known: {', '.join(names) or 'none'})")
+
+    def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, str, list[str], str]]:
+        return type(self), self._given

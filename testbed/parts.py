@@ -5,11 +5,12 @@ from __future__ import annotations
 import functools
 import importlib
 from importlib import resources
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-from testbed.errors import UnknownNameError
+from testbed.document import findings
+from testbed.errors import Problem, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,6 +20,32 @@ class Part(BaseModel):
     """Frozen parameters of one block of the chain; SI floats from Python, strings with units from YAML."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, validated as the constructor does.
+
+        Parameters
+        ----------
+        update : mapping, optional
+            New values by name: SI floats, or strings with units.
+        deep : bool, optional
+            Copy nested parts too, where there is no update.
+
+        Raises
+        ------
+        ScenarioError
+            If a name is unknown or a value is wrong; all at once.
+        """
+        if not update:
+            return super().model_copy(deep=deep)
+        values = {name: getattr(self, name) for name in self.model_fields_set} | dict(update)
+        try:
+            return type(self).model_validate(values)
+        except ValidationError as error:
+            problems = [
+                Problem(message, ".".join(map(str, place))) for place, message in findings(error, type(self), values)
+            ]
+            raise ScenarioError(problems) from error
 
 
 def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:

@@ -32,8 +32,9 @@ ROOMS = {
     "scenario": {"models", "sensors", "fusion"},
     "report": {"pages", "metrics", "runs"},
     "recording": {"pages", "metrics", "runs"},
+    "notebook": {"runs", "report"},
     "judging": {"metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
-    "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording"},
+    "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording", "notebook"},
     "drift": {"compensation", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.

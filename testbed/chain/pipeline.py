@@ -10,7 +10,7 @@ import numpy as np
 from testbed.errors import RunError
 from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
-from testbed.scenario.step_choice import choose_step
+from testbed.scenario.step_choice import choose_step, exposed
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 from testbed.signals import random_stream
 
@@ -49,7 +49,8 @@ class Chain:
             substeps=self.step.substeps,
             holds=self.step.holds,
             pose_stride=POSE_STRIDE,
-            exposed=[name for name, sensor in scenario.sensors.items() if sensor.exposed],
+            exposed=exposed(scenario),
+            modal=self.step.modal,
             floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
         )
         self._temperature = scenario.frame.temperature

@@ -16,25 +16,23 @@ from testbed.sensors import SENSORS
 
 
 def catalogue() -> dict[str, dict[str, str]]:
-    """Return every name with one line, by kind."""
-    table = {
-        kind: {
-            name: _first_line(resolve(kind, name, registry))
-            for name, registry in ((name, registry) for name in registry)
-        }
-        for kind, registry in (("motion", MOTIONS), ("sensor", SENSORS), ("filter", FILTERS))
+    """Return every name with its summary, one finished sentence, by kind."""
+    return {
+        "motions": {name: _summary(resolve("motion", name, MOTIONS)) for name in MOTIONS},
+        "sensors": {name: _summary(resolve("sensor", name, SENSORS)) for name in SENSORS},
+        "filters": {name: _summary(resolve("filter", name, FILTERS)) for name in FILTERS},
+        "turntable_presets": _heads("testbed.models", "presets"),
+        "sensor_presets": _heads("testbed.sensors", "presets"),
+        "beliefs": _heads("testbed.fusion", "beliefs"),
+        "band_sets": _heads("testbed.fusion", "bands"),
+        "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
+        "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }
-    table["turntable preset"] = _heads("testbed.models", "presets")
-    table["sensor preset"] = _heads("testbed.sensors", "presets")
-    table["belief"] = _heads("testbed.fusion", "beliefs")
-    table["band set"] = _heads("testbed.fusion", "bands")
-    table["drift model"] = {name: _first_line(fit).split(";")[0] for name, (_, fit, _) in METHODS.items()}
-    table["paper"] = {name: _first_line(importlib.import_module(module)) for name, module in PAPERS.items()}
-    return table
 
 
-def _first_line(part: Any) -> str:
-    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+def _summary(part: Any) -> str:
+    """Return the first paragraph of a docstring without its markup."""
+    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
 
 
 def _heads(package: str, folder: str) -> dict[str, str]:

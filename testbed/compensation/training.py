@@ -146,7 +146,9 @@ def _folds(rows: slice, fold: float) -> list[slice]:
 
 
 def fit_polynomial(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit by least squares with the penalty of least blocked error; returns it and the rms of that error [rad/s].
+    """Fit by least squares with the penalty of least blocked error.
+
+    Returns it and the rms of that error [rad/s].
 
     Parameters
     ----------
@@ -158,9 +160,9 @@ def fit_polynomial(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
 
 
 def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift; returns as
-    `fit_polynomial`.
+    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift.
 
+    Returns as `fit_polynomial`.
     The error is that of the whitened rows: what is new in a row beyond the noise before it, in units of the noise's
     variance.
 
@@ -176,10 +178,10 @@ def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
 
 
 def fit_process(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit as `fit_coloured`, but as a Gaussian process: prior variances of the largest likelihood, play operators with
-    one of their own.
+    """Fit a Gaussian process under 1/f noise, with the prior variances of the largest likelihood.
 
-    So hysteresis is believed only as far as the cycles show it.
+    As `fit_coloured` otherwise.
+    Play operators have a variance of their own, so hysteresis is believed only as far as the cycles show it.
 
     Parameters
     ----------
@@ -203,7 +205,9 @@ def _least_squares(U: FloatArray, y: FloatArray, n_free: int, folds: list[slice]
 
 
 def fit_lssvm(rows: Rows, seed: int) -> tuple[Lssvm, float]:
-    """Fit a machine with gamma and sigma^2 of least blocked error; returns it and the rms of that error [rad/s].
+    """Fit a least-squares support vector machine with gamma and sigma^2 of least blocked error.
+
+    Returns it and the rms of that error [rad/s].
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from testbed.drift.figures import allan_figure, drift_figure, gain_figure
 from testbed.drift.summary import summary
@@ -65,24 +65,28 @@ def write_audit(audited: Audited, folder: Path) -> Path:
     Path
         The page.
     """
-    figures = summary(audited.audit)
-    about = {
-        "method": audited.method,
-        "trained_on": list(audited.trained_on),
-        "record": audited.thermal.name,
-        "extrapolated": audited.extrapolated,
-    }
     # All made before the first is written: an interrupt does not leave half a folder.
     texts = {
-        "audit.json": json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n",
+        "audit.json": json.dumps(audit_document(audited), indent=2, allow_nan=False) + "\n",
         "gains.csv": _gains(audited.audit),
         "allan.csv": _allan(curves(audited.audit)),
-        "audit.html": _page(audited, figures),
+        "audit.html": _page(audited, summary(audited.audit)),
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_text(folder / name, text)
     return folder / "audit.html"
+
+
+def audit_document(audited: Audited) -> dict[str, Any]:
+    """Return the content of audit.json: what was audited, and its figures with the units in their names."""
+    return {
+        "method": audited.method,
+        "trained_on": list(audited.trained_on),
+        "record": audited.thermal.name,
+        "extrapolated": audited.extrapolated,
+        **summary(audited.audit),
+    }
 
 
 def curves(audit: Audit) -> dict[str, Quality]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from testbed import units
 from testbed.compensation.record import Record
+from testbed.drift.columns import OPTIONS, Columns
 from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.runs.text import ColumnFile, frequency, refusal, unit_factor
+from testbed.runs.text import ColumnFile, quantity, refusal, unit_factor
 from testbed.units import CELSIUS, DEG_H
 
 if TYPE_CHECKING:
@@ -21,47 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.signals import FloatArray
-
-# Of a text file, by the field of `Columns`.
-OPTIONS = {
-    "rate": "--column",
-    "rate_unit": "--unit",
-    "temperature": "--temperature",
-    "temperature_unit": "--temperature-unit",
-    "sample_rate": "--rate",
-    "time": "--time",
-    "time_unit": "--time-unit",
-}
-
-
-@dataclass(frozen=True)
-class Columns:
-    """How to read a text file; a run folder needs none of it but, where it has several such gyros, `sensor`.
-
-    Parameters
-    ----------
-    rate, temperature : str
-        Columns, by their name in the header or their number from 1 on.
-    rate_unit, temperature_unit : str
-        Their units, such as ``deg/h`` and ``degC``.
-    sample_rate : str, optional
-        In hertz or with its unit, unless `time` is given.
-    time : str, optional
-        Column of the time.
-    time_unit : str
-        Its unit.
-    sensor : str, optional
-        Of a run folder.
-    """
-
-    rate: str = "rate"
-    temperature: str = "temperature"
-    rate_unit: str = "deg/h"
-    temperature_unit: str = "degC"
-    sample_rate: str | None = None
-    time: str | None = None
-    time_unit: str = "s"
-    sensor: str | None = None
 
 
 @dataclass(frozen=True)
@@ -167,9 +127,9 @@ def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     ScenarioError
         If it is no run folder, or has no such gyro or several.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     known = [name for name, signals in run.sensors.items() if "temperature" in signals]
     if sensor is not None and sensor not in known:
         raise refusal(folder, str(UnknownNameError("sensor with a thermometer", sensor, known)), "--sensor")
@@ -214,7 +174,11 @@ def read_file(path: Path, columns: Columns) -> ThermalRecord:
     wanted = [table.index(columns.rate, "--column"), table.index(columns.temperature, "--temperature")]
     clock = [] if columns.time is None else [table.index(columns.time, "--time")]
     values = table.read(wanted + clock)
-    rate_hz = frequency(columns.sample_rate) if columns.sample_rate else 1.0 / table.step(values[:, 2] * second)
+    rate_hz = (
+        quantity(columns.sample_rate, "Hz", "100 Hz", "--rate")
+        if columns.sample_rate
+        else 1.0 / table.step(values[:, 2] * second)
+    )
     record = _record(path, values[:, 0] * rate_factor, zero + kelvin * values[:, 1], rate_hz)
     return ThermalRecord(path.name, record, None)
 

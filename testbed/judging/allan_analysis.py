@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -54,6 +54,16 @@ class Term:
         """Return an SI value as a number in the data-sheet unit."""
         return significant(self.in_unit(value), 4)
 
+    def summary(self, fit: AllanFit) -> dict[str, Any]:
+        """Return the coefficient of a fit in the data-sheet unit; a term that is not identified has no value."""
+        found: Coefficient = getattr(fit, self.name)
+        return {
+            "value": self.in_unit(found.value) if found.identified else None,
+            "lower": self.in_unit(found.lower),
+            "upper": self.in_unit(found.upper),
+            "unit": self.unit,
+        }
+
 
 TERMS = (
     Term("quantization", "Q", "urad", "rad", FILTERS[1]),
@@ -92,6 +102,25 @@ class Analysis:
             f"The five terms do NOT describe the curve from {low:g} s to {high:g} s ({numbers}; "
             f"worst at {worth.worst_tau:g} s), so no coefficient is given. {self._advice()}"
         )
+
+    def summary(self) -> dict[str, Any]:
+        """Return curve and coefficients with units in their names, coefficients None where the terms fail."""
+        curve, worth = self.curve, self.fit.goodness
+        columns = {name: (getattr(curve, name) / units.DEG_H).tolist() for name in ("deviation", "lower", "upper")}
+        return {
+            "name": self.record.name,
+            "content": self.record.content,
+            "n_time": curve.n_time,
+            "sample_rate_hz": curve.sample_rate_hz,
+            "fitted_from_s": float(self.fitted.tau[0]),
+            "fitted_to_s": float(self.fitted.tau[-1]),
+            "reduced_chi_square": worth.reduced_chi_square,
+            "freedom": worth.freedom,
+            "p_value": worth.p_value,
+            "worst_tau_s": worth.worst_tau,
+            "coefficients": {term.letter: term.summary(self.fit) for term in TERMS} if worth.accepted else None,
+            "curve": {"tau_s": curve.tau.tolist(), **{f"{name}_deg_h": values for name, values in columns.items()}},
+        }
 
     def _advice(self) -> str:
         """Propose the widest range, cut at one end, over which the model holds, with a margin."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import UnknownNameError
-from testbed.runs.text import ColumnFile, frequency, refusal, unit_factor
+from testbed.runs.text import ColumnFile, quantity, refusal, unit_factor
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,7 +78,7 @@ def read(
         raise refusal(source, "expected a text file or a run folder, got neither")
     if unit is None:
         raise refusal(source, "expected the unit of the column, such as deg/s", "--unit")
-    rate_hz = None if rate is None else frequency(rate)
+    rate_hz = None if rate is None else quantity(rate, "Hz", "100 Hz", "--rate")
     return [read_file(source, unit=unit, column=column, sample_rate_hz=rate_hz, time=time, time_unit=time_unit)]
 
 
@@ -104,10 +104,10 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     ScenarioError
         If it is no run folder, the sensor is not in it or its readings have gaps.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
     from testbed.scenario.loader import load_scenario
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     scenario = load_scenario(folder / "scenario.yaml")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")

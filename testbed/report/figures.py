@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from testbed.report.digest import Digest, ErrorTrace
-    from testbed.report.folder import FloorDensity
+    from testbed.runs.metrics import FloorDensity
 
 MAX_LABELLED_LINES = 6
 DOTTED = (0, (1.2, 2.2))

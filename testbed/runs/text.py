@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import warnings
 from typing import TYPE_CHECKING, NoReturn
 
@@ -22,8 +23,15 @@ if TYPE_CHECKING:
 _JITTER = 0.25
 
 
-def frequency(text: str) -> float:
-    """Return the frequency [Hz] that `text` gives, with its unit or as a number in hertz.
+def quantity(text: str, si: str, example: str, key: str) -> float:
+    """Return the positive quantity that `text` gives, with its unit or as a number in SI.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``100`` or ``2 kHz``.
+    si, example, key : str
+        SI unit of the result, a good text, and the option that gave it, for the message.
 
     Raises
     ------
@@ -31,11 +39,11 @@ def frequency(text: str) -> float:
         If it is none above zero.
     """
     try:
-        value = float(text) if _is_number(text) else units.parse(text, "Hz", example="100 Hz")
+        value = float(text) if _is_number(text) else units.parse(text, si, example=example)
     except ValueError as error:
-        raise ScenarioError([Problem(str(error), key="--rate")]) from error
+        raise ScenarioError([Problem(str(error), key=key)]) from error
     if not (value > 0.0 and math.isfinite(value)):
-        raise ScenarioError([Problem(f"expected more than 0 Hz, got {text}", key="--rate")])
+        raise ScenarioError([Problem(f"expected more than 0 {si}, got {text}", key=key)])
     return value
 
 
@@ -95,7 +103,7 @@ class ColumnFile:
         """Return the place of a column given by its name or its number."""
         if column in self._names:
             return self._names.index(column)
-        if not (column.isdigit() and 1 <= int(column) <= self._n_columns):
+        if not (re.fullmatch("[0-9]{1,9}", column) and 1 <= int(column) <= self._n_columns):
             known = (
                 f"the header has {', '.join(map(repr, self._names))}"
                 if self._names

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import ScenarioError
+from testbed.models.turntable.floor import Floor
+from testbed.models.turntable.modal import check_modal
 from testbed.models.turntable.servo import required_torque
-from testbed.models.turntable.turntable import check_plant
+from testbed.models.turntable.turntable import Turntable, check_plant
 from testbed.scenario.model import METRICS
-from testbed.scenario.step_choice import given_step
+from testbed.scenario.step_choice import excerpt, exposed, given_step
 
 if TYPE_CHECKING:
     from testbed.document import Document
@@ -82,6 +84,15 @@ def _check_plant(scenario: Scenario, document: Document) -> None:
         check_plant(parameters, scenario.base_rate_hz, step.substeps, step.holds)
     except ScenarioError as error:
         document.find(("turntable",), _reasons(error))
+        return
+    if parameters.engine == "modal":
+        try:
+            check_modal(parameters, exposed(scenario))
+            # Whether its modes can be told apart shows when they are computed; its disturbances do not change them.
+            still = parameters.model_copy(update={"floor": Floor(), "wobble": ()})
+            Turntable(still, {}, scenario.base_rate_hz, modal=True).process(excerpt(scenario).process(1))
+        except ScenarioError as error:
+            document.find(("turntable", "engine"), _reasons(error))
 
 
 def _reasons(error: ScenarioError) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, unknown_key
-from testbed.errors import UnknownNameError, quoted
+from testbed.errors import ScenarioError, UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.models.motions import MOTIONS
@@ -18,8 +19,6 @@ from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
 from testbed.sensors import SENSORS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from testbed.models.motion import Motion
     from testbed.sensors.base import Sensor
 
@@ -44,9 +43,48 @@ def load_scenario(path: str | Path) -> Scenario:
     ScenarioError
         With every finding at once: file, line, key and what was expected.
     """
-    document = Document(Path(path))
-    reader = _Reader(document, Path(path).resolve().parent)
-    scenario = reader.scenario()
+    return read_document(Document(Path(path)), Path(path).resolve().parent)
+
+
+def as_scenario(given: object) -> Scenario:
+    """Return a scenario as it is, or read it from its file or from a mapping.
+
+    Parameters
+    ----------
+    given : Scenario, str, Path or mapping
+        Which; relative paths of a mapping begin in the working folder.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no valid scenario.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if isinstance(given, str | Path):
+        return load_scenario(given)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given)
+    msg = f"expected a scenario, its file or a mapping of its keys, got {quoted(given)}"
+    raise ScenarioError(msg)
+
+
+def read_document(document: Document, folder: Path) -> Scenario:
+    """Validate the content of a document as a scenario.
+
+    Parameters
+    ----------
+    document : Document
+        Of a file, or of a mapping built in Python.
+    folder : Path
+        Where relative paths in it begin.
+
+    Raises
+    ------
+    ScenarioError
+        With every finding at once.
+    """
+    scenario = _Reader(document, folder).scenario()
     document.refuse()
     assert scenario is not None
     cross_check(scenario, document)
@@ -79,7 +117,17 @@ class _Reader:
         if frame is None or turntable is None or self._doc.problems:
             return None
         return Scenario(
-            frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data, self._presets
+            frame,
+            turntable,
+            motion,
+            sensors,
+            types,
+            fusion,
+            expect,
+            self._doc.file,
+            self._folder,
+            self._doc.data,
+            self._presets,
         )
 
     def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:

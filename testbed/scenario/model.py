@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
+from testbed.document import Document
+from testbed.inputs.plain import plain_tree
 from testbed.models.motion import MotionProfile
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
+from testbed.scenario.edits import edited
 from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from pathlib import Path
 
     from testbed.fusion.belief import SensorBelief
+    from testbed.inputs.tree import Tree
     from testbed.models.motion import Motion
     from testbed.models.turntable.turntable import TurntableParameters
     from testbed.sensors.base import Sensor
@@ -108,8 +112,14 @@ class FilterSpec:
 class Scenario:
     """A validated scenario in SI.
 
-    `source` is the mapping as written in the file, with the user's units, and `presets` holds the parts that presets
-    filled in; `file` is where it stands.
+    `source` is the mapping as written, with the user's units, and `presets` holds the parts that presets filled in;
+    `file` is where it stands, nothing if it was built in Python, and `folder` where relative paths begin.
+
+    Examples
+    --------
+    >>> scenario = Scenario.from_dict({"name": "still", "duration": "2 s", "motion": [{"static": {}}]})
+    >>> scenario.with_(duration="5 s", **{"motion.0": {"sine": {"frequency": "4 Hz", "rate": "1 deg/s"}}}).lines
+    (4.0,)
     """
 
     frame: Frame
@@ -120,6 +130,7 @@ class Scenario:
     fusion: Mapping[str, FilterSpec]
     expect: tuple[Bound, ...]
     file: str
+    folder: Path
     source: Mapping[str, Any] = field(repr=False)
     presets: Mapping[str, Any] = field(repr=False)
 
@@ -169,9 +180,56 @@ class Scenario:
         ]
         return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
 
+    @classmethod
+    def from_dict(cls, mapping: Mapping[str, Any], folder: str | Path = ".") -> Scenario:
+        """Return the scenario that a mapping describes, validated as a file is.
+
+        Parameters
+        ----------
+        mapping : mapping
+            The keys of a scenario file; every dimensional value is a string with its unit.
+        folder : str or Path, optional
+            Where relative paths in it begin.
+
+        Raises
+        ------
+        ScenarioError
+            With every finding at once: key and what was expected.
+        """
+        return _built(plain_tree(mapping), Path(folder), "")
+
+    def with_(self, **changes: Any) -> Scenario:
+        """Return the scenario with other values, validated as a whole.
+
+        Parameters
+        ----------
+        **changes : Any
+            What shall stand at a key, in units as in a file: ``duration="5 s"``, and by dotted keys
+            ``**{"sensors.mems_gyro.range": "300 deg/s", "motion.0.sine.frequency": "4 Hz"}``. None removes the key; a
+            mapping or a list replaces what stood there.
+
+        Raises
+        ------
+        ScenarioError
+            With every finding at once: key and what was expected; also for a key or an index that is not there.
+        """
+        return _built(plain_tree(edited(self.source, changes, self.file)), self.folder, self.file)
+
     def with_seed(self, seed: int) -> Scenario:
-        """Return the same scenario under another seed."""
-        return replace(self, frame=self.frame.model_copy(update={"seed": seed}))
+        """Return the same scenario under another seed; quick, since nothing else is validated again.
+
+        Parameters
+        ----------
+        seed : int
+            At least 0.
+
+        Raises
+        ------
+        ScenarioError
+            If it is no such number.
+        """
+        frame = self.frame.model_copy(update=plain_tree({"seed": seed}).data)
+        return replace(self, frame=frame, source={**self.source, "seed": frame.seed})
 
     def kept_in(self, folder: Path) -> Scenario:
         """Return the same scenario with the files that its motion reads copied to `folder`: it needs no others."""
@@ -199,6 +257,12 @@ class Scenario:
             },
             "expect": _expectations(self.expect),
         }
+
+
+def _built(tree: Tree, folder: Path, file: str) -> Scenario:
+    from testbed.scenario.loader import read_document
+
+    return read_document(Document(file, tree=tree), folder.resolve())
 
 
 def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:

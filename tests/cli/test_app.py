@@ -207,7 +207,7 @@ def test_schema_accepts_every_shipped_scenario_and_refuses_a_bad_one(tmp_path):
 
 def test_help_loads_no_heavy_library(tmp_path):
     code = (
-        "import sys; sys.argv = ['testbed', '--help']\nfrom testbed.cli.app import main\ntry:\n    main()\nexcept "
+        "import sys; sys.argv = ['testbed', '--help']\nfrom testbed.cli import main\ntry:\n    main()\nexcept "
         "SystemExit:\n    pass\n"
     )
     code += (

@@ -8,7 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import testbed
-from testbed.cli.app import app, main
+from testbed.cli import main
+from testbed.cli.app import app
 from testbed.drift.records import Columns, read
 from testbed.drift.session import read_model
 from testbed.errors import ScenarioError
@@ -20,6 +21,7 @@ DEG_H = np.radians(1.0) / 3600.0
 def ends_with(arguments, monkeypatch, capsys):
     """Run the installed command, return its exit status and what it printed."""
     monkeypatch.setattr("sys.argv", ["testbed", "compensate", *map(str, arguments)])
+    monkeypatch.setattr("signal.signal", lambda *_: None)
     with pytest.raises(SystemExit) as end:
         main()
     return end.value.code, "".join(capsys.readouterr())
@@ -107,6 +109,26 @@ def test_applying_writes_what_the_model_says(cycles, model, tmp_path):
     np.testing.assert_allclose(written["drift_deg_h"], expected.drift / DEG_H, rtol=1e-8)
     np.testing.assert_array_equal(written["extrapolated"], expected.extrapolated)
     np.testing.assert_allclose(written["time_s"], 10.0 * np.arange(8520))
+
+
+def test_each_command_says_its_result_to_a_program(cycles, model, tmp_path):
+    def document(*words):
+        result = CliRunner().invoke(app, ["compensate", *map(str, words), "--json"])
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout)
+
+    out = tmp_path / "model.json"
+    found = document("train", cycles / "up", cycles / "down", "--out", out)
+    assert found["cycles"] == ["up, fog", "down, fog"]
+    assert found["blocked_error_deg_h"] == pytest.approx(read_model(out).blocked_error / DEG_H)
+    assert found["written"] == str(out)
+    assert out.read_text() == model.read_text()
+    found = document("apply", model, cycles / "unseen", "--out", tmp_path / "plain.csv")
+    share = np.genfromtxt(tmp_path / "plain.csv", delimiter=",", names=True)["extrapolated"].mean()
+    assert (found["record"], found["method"]) == ("unseen, fog", "gradient")
+    assert found["extrapolated"] == pytest.approx(share)
+    found = document("audit", model, cycles / "unseen", "--out", tmp_path / "audit")
+    assert found == {**json.loads((tmp_path / "audit" / "audit.json").read_text()), "written": str(tmp_path / "audit")}
 
 
 def test_the_audit_of_a_frozen_model_passes_and_reduces_the_drift(cycles, model, tmp_path):

@@ -64,8 +64,8 @@ def test_table_shows_estimates_intervals_and_limits(tmp_path, white_file):
         assert rows[letter][2] == "not identified"
         assert rows[letter][4].startswith("< ")
     assert "The five terms describe the curve from 0.01 s to 125 s" in result.stdout
-    assert "wrote allan_static.svg" in result.stdout
-    assert [path.name for path in tmp_path.iterdir()] == ["allan_static.svg"]
+    assert "wrote runs/allan_static.svg" in result.stdout
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["allan_static.svg"]
 
 
 @pytest.mark.parametrize("suffix", ["svg", "PNG", "pdf"])
@@ -103,8 +103,8 @@ def test_run_folder_gives_every_sensor_and_is_left_alone(still_run, tmp_path):
     assert result.returncode == 0, result.stderr
     assert "mhd_ars of short, less its noise-free reading" in result.stdout
     assert "mems_gyro of short, less its noise-free reading" in result.stdout
-    assert "wrote allan_run.svg" in result.stdout
-    assert (tmp_path / "allan_run.svg").is_file()
+    assert "wrote runs/allan_run.svg" in result.stdout
+    assert (tmp_path / "runs" / "allan_run.svg").is_file()
     assert sorted(path.name for path in still_run.iterdir()) == before
     assert_clear(call("allan", still_run, "--sensor", "mhd_arz", cwd=tmp_path), 2)
     assert_clear(call("allan", still_run, "--unit", "deg/s", cwd=tmp_path), 2)
@@ -146,7 +146,9 @@ def test_a_gap_in_the_readings_is_refused(still_run, monkeypatch):
         name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate))
         for name, s in run.sensors.items()
     }
-    monkeypatch.setattr("testbed.runs.folder.open_run", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth))
+    monkeypatch.setattr(
+        "testbed.runs.results.RunRecord.open", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth)
+    )
     with pytest.raises(ScenarioError, match="without gaps, got 1 that are missing"):
         read_run(still_run, "mems_gyro")
 
@@ -193,7 +195,7 @@ def test_a_refused_fit_prints_no_coefficient(tmp_path):
     assert "│" not in result.stdout
     for term in TERMS:
         assert term.unit not in result.stdout.replace("rad/s", "")
-    figure = (tmp_path / "allan_markov.svg").read_text()
+    figure = (tmp_path / "runs" / "allan_markov.svg").read_text()
     assert figure.startswith("<?xml")
 
 

@@ -16,7 +16,8 @@ from testbed.errors import ScenarioError
 from testbed.pages.numbers import fixed, significant
 from testbed.report import write_report
 from testbed.report.digest import digest_run, zoom_window
-from testbed.report.folder import RunMetrics, open_run, read_metrics
+from testbed.runs.metrics import RunMetrics
+from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -309,9 +310,7 @@ def test_report_wrong_units_and_unknown_filter_are_named(tmp_path: Path):
 
 
 def digest_of(folder: Path):
-    metrics = read_metrics(folder / "metrics.json")
-    with open_run(folder / "run.nc") as data:
-        return digest_run(data, metrics)
+    return digest_run(RunRecord.open(folder))
 
 
 def test_digest_pairs_each_reading_with_the_truth_at_its_instant(tmp_path: Path):

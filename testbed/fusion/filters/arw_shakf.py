@@ -140,8 +140,9 @@ class ArwShakf(SageHusa):
 
 
 class ArwShakfLiteral(ArwShakf):
-    """The filter of `ArwShakf` as printed: innovations themselves in (17) and (34), N_k with infinite memory, bands
-    from the second reading.
+    """The filter of paper 1 as printed, which `arw_shakf` corrects.
+
+    Innovations themselves stand in (17) and (34), N_k has infinite memory, bands hold from the second reading.
 
     At the q of `Shakf` it repairs nothing: (17) and S undo the reset of R. With its own q of 0.3 (deg/s)^2/s it works,
     and so does `Shakf`.

@@ -61,7 +61,7 @@ class WidebandParameters(FormParameters):
 
 
 class Wideband(ModelFilter):
-    r"""Bank of Kalman filters with process noise :math:`q_1 \ldots q_M`, mixed by innovation likelihood.
+    r"""Bank of Kalman filters, one per level of process noise, mixed by innovation likelihood.
 
     .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
         \hat x = \sum w_i \hat x_i, \quad P = \sum w_i (P_i + (\hat x_i - \hat x)^2)

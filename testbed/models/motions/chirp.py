@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class Chirp(Motion):
-    r"""Sine of constant rate amplitude whose frequency runs from `start_frequency` f0 to `stop_frequency` f1 over the
-    sweep time T.
+    r"""Sine of constant rate amplitude whose frequency runs from a first to a last.
 
+    From `start_frequency` f0 to `stop_frequency` f1 over the sweep time T;
     linear: :math:`f(t) = f_0 + (f_1 - f_0) t/T`; logarithmic: :math:`f(t) = f_0 (f_1/f_0)^{t/T}`; the rate is
     :math:`a \sin(2\pi \int_0^t f)`. After T it stays at f1 with continuous phase.
 

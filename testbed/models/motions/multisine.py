@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 
 class Multisine(Motion):
-    r"""Sum of n sines of equal amplitude, :math:`\sum_i a_i \sin(2\pi f_i t + \varphi_i)`.
+    r"""Sum of sines of equal amplitude with a low crest factor.
 
+    :math:`\sum_i a_i \sin(2\pi f_i t + \varphi_i)` with n frequencies.
     Schroeder's phases :math:`\varphi_i = -\pi i (i - 1)/n` (i = 1 ... n) keep the crest factor low (M. Schroeder, IEEE
     Trans. Inf. Theory, 1970).
 

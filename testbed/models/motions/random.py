@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 class Random(Motion):
-    r"""Gaussian random rate with the constant two-sided density `psd` for `low` <= |f| <= `high` and nothing outside.
+    r"""Gaussian random rate with the constant two-sided density in a band and nothing outside.
+
+    The density is `psd` for `low` <= |f| <= `high`.
 
     One realisation of `testbed.models.turntable.realisation.gaussian_rate`; the variance is 2 S (high - low).
 

@@ -47,6 +47,12 @@ class Disturbances:
         names = [model.actuator(i).name for i in range(model.nactuator)]
         self._column = {name: int(model.actuator_ctrladr[i]) for i, name in enumerate(names)}
 
+    @property
+    def columns(self) -> list[int]:
+        """Columns of the controls that it moves."""
+        none = np.zeros(1)
+        return sorted({column + i for column, *_ in self._inputs(none, none, none) for i in range(2)})
+
     def apply(self, control: FloatArray, start: int, angle: FloatArray, rate: FloatArray) -> None:
         """Fill in the columns of mounts and bearing.
 

@@ -178,6 +178,10 @@ class TurntableParameters(Part):
     step : float or "auto"
         Integration step [s]; a whole part or multiple of the 50 us over which references are held, or `auto`: as long
         as the true rate stays within 1e-6 of its largest value, see `testbed.scenario.step_choice.choose_step`.
+    engine : {"mujoco", "modal", "auto"}
+        What plays the plant: MuJoCo's steps; the modes of its linearisation, exact over each hold (modes `servo` and
+        `ideal`, `testbed.models.turntable.modal`); or the modes where excerpts played by both agree to 1e-6 of the
+        largest rate, and MuJoCo elsewhere.
     gravity : float
         Acceleration of gravity [m/s^2].
     platform_mass : float
@@ -236,6 +240,7 @@ class TurntableParameters(Part):
 
     mode: Literal["servo", "digital", "ideal", "fixed"] = "servo"
     step: Step = 5e-5
+    engine: Literal["mujoco", "modal", "auto"] = "mujoco"
     gravity: Acceleration = 9.80665
     platform_mass: Mass = 400.0
     platform_inertia: Inertias = (24.0, 24.0, 45.0)

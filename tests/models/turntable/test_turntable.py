@@ -420,9 +420,9 @@ OTHER_VALUES = {
     "wobble": (Wobble(axis="ry", angle=1e-6, periods=2),),
     "earth_rate": EarthRate(latitude=0.8),
 }
-# Shown elsewhere: the modes and the step in tests of their own, the height of the sensors in the picture, the limit
-# when it is reached.
-ELSEWHERE = {"mode", "step", "mounting_height", "torque_limit", "floor"}
+# Shown elsewhere: the modes, the step and the engine in tests of their own, the height of the sensors in the picture,
+# the limit when it is reached.
+ELSEWHERE = {"mode", "step", "engine", "mounting_height", "torque_limit", "floor"}
 
 
 def test_other_values_cover_every_parameter() -> None:

@@ -1,8 +1,8 @@
-"""An audit on the terminal."""
+"""Drift compensation on the terminal."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -11,9 +11,27 @@ from testbed.drift.summary import LETTERS, summary
 from testbed.pages.numbers import significant
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from testbed.drift.page import Audited
+
+
+def print_training(found: Mapping[str, Any]) -> None:
+    """Print what was trained, and where the model is."""
+    error = f"error of the cross-validation {found['blocked_error_deg_h']:.4g} deg/h, noise of the means included"
+    _print(f"method {found['method']}, {len(found['cycles'])} cycles; {error}", found)
+
+
+def print_application(found: Mapping[str, Any]) -> None:
+    """Print how far a model had to be extrapolated, and where the compensated record is."""
+    _print(f"{found['extrapolated']:.2%} of the samples outside the trained range", found)
+
+
+def _print(line: str, found: Mapping[str, Any]) -> None:
+    console = Console(soft_wrap=True)
+    console.print(line, highlight=False)
+    console.print(f"wrote {found['written']}", highlight=False)
 
 
 def print_audit(audited: Audited, folder: Path) -> None:
@@ -51,7 +69,7 @@ def print_audit(audited: Audited, folder: Path) -> None:
     for leak in figures["leaks"]:
         console.print(f"LEAK: {leak}", style="red")
     console.print("verdict: " + ("no leak found" if figures["passed"] else "a leak; do not believe this result"))
-    console.print(f"written: {folder / 'audit.html'}")
+    console.print(f"wrote {folder / 'audit.html'}")
 
 
 def _row(quality: dict[str, object]) -> list[str]:

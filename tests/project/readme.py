@@ -1,0 +1,34 @@
+"""Write the table of commands into README.md: `python -m tests.project.readme`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tests.cli.commands import COMMANDS, arguments, options
+
+README = Path(__file__).parents[2] / "README.md"
+BEGIN, END = "<!-- commands, written by `make readme` -->\n", "<!-- end of the commands -->\n"
+
+
+def row(words: str, command: Any) -> str:
+    """Return the row of a command: what is read, the options beside --json and --quiet, the summary."""
+    own = [word for word in options(command) if word not in ("--json", "--quiet", "--help")]
+    parts = [words, *(part.metavar + ("..." if part.nargs == -1 else "") for part in arguments(command))]
+    usage = " ".join([*parts, f"[{' '.join(own)}]"] if own else parts)
+    return f"| `{usage}` | {' '.join(command.help.split())} |"
+
+
+def table() -> str:
+    """Return the table of commands."""
+    return "\n".join(["| command | does |", "|---|---|", *(row(*item) for item in COMMANDS.items())]) + "\n"
+
+
+def with_table(text: str) -> str:
+    """Return the text of the README with the table as the commands are."""
+    head, rest = text.split(BEGIN)
+    return head + BEGIN + table() + END + rest.split(END)[1]
+
+
+if __name__ == "__main__":
+    README.write_text(with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
