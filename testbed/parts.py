@@ -21,6 +21,11 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file."""
+        return list(cls.model_fields)
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy with other values, validated as the constructor does.
 

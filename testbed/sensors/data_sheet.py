@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 from scipy.signal import butter
 
 from testbed.units import Quantity, parse
@@ -73,7 +75,7 @@ class Word:
 
     def becomes(self, value: float) -> str:
         """Return what a value in SI becomes, in words."""
-        shown = value * self.factor / parse(f"1 {self.shown}", self.unit, cycle_is_number=True)
+        shown = value * self.factor / parse(f"1 {self.shown}", self.unit, cycle_is_number="Hz" not in self.unit)
         return f"{self.field}: {shown:.6g} {self.shown}"
 
 
@@ -101,6 +103,8 @@ GYRO_WORDS = (OUTPUT_RATE, FULL_SCALE, RATE_NOISE_DENSITY, IN_RUN_BIAS_STABILITY
 # Ways to give a low-pass, one of them.
 LOW_PASSES = (("corner", "damping"), ("numerator", "denominator"), ("bandwidth", "order"))
 _MOST_POLES = 8
+# A default that follows from other fields, which are wrong.
+_CONSEQUENCE = "default_factory_not_called"
 
 
 class Sheet:
@@ -118,6 +122,8 @@ class Sheet:
         self.values, self._border = dict(values), border
         self.steps: list[Step] = []
         self.problems: dict[str, str] = {}
+        # Parameters that are missing only because their word could not be read.
+        self._unread: set[tuple[str, ...]] = set()
 
     def translate(self, word: Word) -> None:
         """Replace the key of `word`, if it is there, by its parameter."""
@@ -125,7 +131,9 @@ class Sheet:
             return
         written = self.values.pop(word.key)
         value = self._read(word.key, word.quantity, written)
-        if value is not None:
+        if value is None:
+            self._unread.add((word.field,))
+        else:
             si = value * word.factor
             self.values[word.field] = f"{si!r} {word.unit}" if self._border else si
             self.steps.append(Step(word.key, str(written), word.rule, word.becomes(value)))
@@ -156,6 +164,22 @@ class Sheet:
         rule = f"-3 dB of a Butterworth low-pass of order {order}"
         self.steps.append(Step("bandwidth", str(written), rule, becomes))
 
+    def refusal(self, title: str) -> ValidationError:
+        """Return the error of all problems, for a model called `title`."""
+        return ValidationError.from_exception_data(title, self._lines())
+
+    def beside(self, error: ValidationError) -> ValidationError:
+        """Return the problems together with what else is wrong, less what only follows from either."""
+        others = [
+            _line(one["type"], one["loc"], one["msg"], one["input"])
+            for one in error.errors()
+            if one["loc"] not in self._unread and one["type"] != _CONSEQUENCE
+        ]
+        return ValidationError.from_exception_data(error.title, [*self._lines(), *others])
+
+    def _lines(self) -> list[InitErrorDetails]:
+        return [_line("quantity", (key,), message, None) for key, message in self.problems.items()]
+
     def _said_twice(self, key: str, others: tuple[str, ...]) -> bool:
         twice = [other for other in others if other in self.values]
         if twice:
@@ -169,6 +193,11 @@ class Sheet:
         except ValueError as error:
             self.problems[key] = str(error)
             return None
+
+
+def _line(kind: str, place: tuple[str | int, ...], message: str, value: Any) -> InitErrorDetails:
+    error = PydanticCustomError(kind, "{reason}", {"reason": message})
+    return InitErrorDetails(type=error, loc=place, input=value)
 
 
 def low_pass(bandwidth: float, order: int) -> dict[str, Any]:
@@ -192,7 +221,9 @@ def low_pass(bandwidth: float, order: int) -> dict[str, Any]:
     return {"numerator": tuple(map(float, numerator)), "denominator": tuple(map(float, denominator))}
 
 
-def lay_over(base: Mapping[str, Any], entry: Mapping[str, Any], ways: tuple[tuple[tuple[str, ...], ...], ...]) -> dict[str, Any]:
+def lay_over(
+    base: Mapping[str, Any], entry: Mapping[str, Any], ways: tuple[tuple[tuple[str, ...], ...], ...]
+) -> dict[str, Any]:
     """Return the keys of `base` that stay when `entry` is laid over it: what it says in other words goes.
 
     Parameters

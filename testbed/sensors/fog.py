@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numba import njit
@@ -10,6 +10,7 @@ from numba import njit
 from testbed.models.fog_thermal import FogThermal
 from testbed.parts import Part
 from testbed.sensors.base import Decimator, Sensor, Surroundings, rate_ratio
+from testbed.sensors.data_sheet import GYRO_WORDS, Word
 from testbed.sensors.gyro_errors import GainError
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
@@ -62,7 +63,14 @@ class Fog(Sensor, GyroTerms):
         Bias by temperature, and the temperatures inside.
     thermometer : Thermometer
         The thermometer inside.
+
+    Notes
+    -----
+    Of the keys of data sheets it takes `output_rate`, `full_scale`, `rate_noise_density` (one-sided) and
+    `in_run_bias_stability` (Allan floor); see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = GYRO_WORDS
 
     bandwidth: Frequency
     range: Range

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage, Ramp
 from testbed.sensors.sampled_noise import Rational
 from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
-from testbed.units import Frequency, Quantity, Range
+from testbed.units import Frequency, Quantity, Range, RateStd
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from typing import Self
 
     from numpy.typing import ArrayLike
@@ -23,7 +25,14 @@ if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
 
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
+# A stated total noise is a typical figure: as far as this from what density and bandwidth make it is no contradiction.
+_TRUSTED = 0.15
 Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+
+
+def _whole_word(given: dict[str, Any]) -> float:
+    """Return the sensitivity [LSB s/rad] of a word that spans the range, from the fields read before."""
+    return float(2 ** (given.get("word_bits", 32) - 1) - 1) / float(given.get("range", 1.0))
 
 
 class MemsGyro(GyroErrors, Sensor, GyroTerms):
@@ -44,19 +53,46 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         Its damping ratio [-].
     range : float
         Readings saturate at plus and minus this [rad/s].
-    sensitivity : float
-        Counts per rate of the output word [LSB s/rad].
     word_bits : int
         Length of the output word, two's complement [-].
+    sensitivity : float
+        Counts per rate of the output word [LSB s/rad]; left out, the word spans the range.
+    total_rms_noise : float, optional
+        What the data sheet says that the noise comes to [rad/s]: compared with what it does, see `doubts`.
+
+    Notes
+    -----
+    Data sheets have other keys, which are read too: `output_rate`, `full_scale`, `rate_noise_density` (one-sided),
+    `in_run_bias_stability` (Allan floor), `bandwidth` (-3 dB) with `order` (2); see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = GYRO_WORDS
 
     numerator: Coefficients | None = None
     denominator: Coefficients | None = None
     corner: Frequency | None = None
     damping: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 0.5**0.5
     range: Range
-    sensitivity: WordSensitivity
     word_bits: Annotated[int, Field(strict=True, ge=2, le=32)] = 32
+    sensitivity: WordSensitivity = Field(default_factory=_whole_word)
+    total_rms_noise: RateStd | None = None
+
+    @classmethod
+    def sheet(cls, values: Mapping[str, Any], *, border: bool) -> Sheet:
+        """Return the keys of a file with those of data sheets turned into parameters; see `Sensor.sheet`."""
+        sheet = super().sheet(values, border=border)
+        sheet.translate_low_pass()
+        return sheet
+
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file; see `Sensor.known_keys`."""
+        return [*super().known_keys(), *LOW_PASSES[-1]]
+
+    @classmethod
+    def ways(cls) -> tuple[tuple[tuple[str, ...], ...], ...]:
+        """Return the keys that say the same; see `Sensor.ways`."""
+        return (*super().ways(), LOW_PASSES)
 
     @model_validator(mode="after")
     def _one_low_pass(self) -> Self:
@@ -122,6 +158,24 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         terms = self.noise_psd(freq_hz) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
+
+    def output_rms(self) -> float:
+        """Return the noise of the readings from 0.1 Hz up, all that folds in and the rounding included [rad/s]."""
+        freq = np.geomspace(0.1, 1e6, 4000)
+        power = self.noise_psd(freq) * np.abs(self.response(freq) / (1.0 + self.scale_factor_error)) ** 2
+        return float(np.sqrt(2.0 * np.trapezoid(power, freq) + 1.0 / (12.0 * self.sensitivity**2)))
+
+    def doubts(self) -> list[str]:
+        """Return where the stated total noise is not what density and bandwidth make; see `Sensor.doubts`."""
+        stated, made = self.total_rms_noise, self.output_rms()
+        if not stated or abs(stated / made - 1.0) <= _TRUSTED:
+            return []
+        twice = abs(stated / made / 2.0**0.5 - 1.0) <= _TRUSTED
+        hint = "the density may be two-sided: give it as angle_random_walk" if twice else "see bandwidth and order"
+        stated_deg, made_deg = np.rad2deg([stated, made])
+        return [
+            f"total_rms_noise is {stated_deg:.4g} deg/s, but density and bandwidth make {made_deg:.4g} deg/s: {hint}"
+        ]
 
     def datasheet(self) -> list[tuple[str, str]]:
         """Return the noise in data-sheet units and what it comes to; see `Sensor.datasheet`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -12,6 +13,7 @@ from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
+from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
 from testbed.sensors.noise_terms import NoiseStage
@@ -64,7 +66,17 @@ class MhdArs(Sensor, ElectronicTerms):
         The converter spans plus and minus this [V].
     adc_bits : int
         Its word length, two's complement [-].
+
+    Notes
+    -----
+    Of the keys of data sheets it takes `output_rate` and `rate_noise_density`, one-sided, in place of `noise_density`,
+    which is two-sided; see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = (
+        OUTPUT_RATE,
+        replace(RATE_NOISE_DENSITY, field="noise_density", shown="nrad/s/sqrt(Hz)"),
+    )
 
     channel: MhdChannel
     temperature: Temperature = REFERENCE
