@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from testbed.chain.runner import run
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.notebook import Run, open_run
+    from testbed.scenario.beliefs import belief_of
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
 
@@ -31,6 +32,7 @@ __all__ = [
     "ScenarioError",
     "UnknownNameError",
     "__version__",
+    "belief_of",
     "load_scenario",
     "open_run",
     "run",
@@ -43,6 +45,7 @@ _LAZY = {
     "Scenario": "testbed.scenario.model",
     "ScenarioError": "testbed.errors",
     "UnknownNameError": "testbed.errors",
+    "belief_of": "testbed.scenario.beliefs",
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
     "run": "testbed.chain.runner",

@@ -52,6 +52,7 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
     _print_budget(console, metrics.budget)
+    _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
     _print_table(console, metrics.turntable)
     for bound in metrics.expectations:
@@ -71,6 +72,13 @@ def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list
         for row in kind:
             table.add_row(*(row[i] for i in kept), end_section=row is kind[-1])
     console.print(table)
+
+
+def _print_beliefs(console: Console, fusion: Mapping[str, SourceMetrics]) -> None:
+    """Print what the filters were told of the sensors, those of one belief together."""
+    for belief in dict.fromkeys(source.belief for source in fusion.values()):
+        names = [name for name, source in fusion.items() if source.belief == belief]
+        console.print(f"belief of {', '.join(names)}: {belief}", soft_wrap=True, highlight=False)
 
 
 def _print_claims(console: Console, fusion: Mapping[str, SourceMetrics]) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.fusion.belief import declared
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
@@ -79,13 +80,14 @@ class Judge:
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
+                "belief": declared(spec.belief),
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 "floor_rmse_deg_s": floor_deg,
                 "optimum_rmse_deg_s": optimum_deg,
                 "consistency": self._consistency[name].result(),
             }
-            for name in self._scenario.fusion
+            for name, spec in self._scenario.fusion.items()
         }
         for row in fusion.values():
             for line in row["lines"]:

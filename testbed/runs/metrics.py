@@ -67,8 +67,11 @@ class ConsistencyMetrics(Entry):
 
 
 class SourceMetrics(Entry):
-    """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings."""
+    """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
+    a filter's is from.
+    """
 
+    belief: str | None = None
     rmse_deg_s: float | None = None
     rmse_aligned_deg_s: float | None = None
     peak_error_deg_s: float | None = None

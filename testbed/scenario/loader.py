@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, unknown_key
 from testbed.errors import ScenarioError, UnknownNameError, quoted
-from testbed.fusion import FILTERS
-from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable.turntable import TurntableParameters
 from testbed.parts import merge, preset, resolve
+from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
-from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
+from testbed.scenario.entries import is_name, kind_of, mapping
+from testbed.scenario.fusion import Fusion
+from testbed.scenario.model import Bound, Frame, Scenario
 from testbed.sensors import SENSORS
 
 if TYPE_CHECKING:
+    from testbed.fusion.belief import SensorBelief
     from testbed.models.motion import Motion
     from testbed.sensors.base import Sensor
 
@@ -99,6 +101,7 @@ class _Reader:
         self._doc = document
         self._folder = folder
         self._presets: dict[str, Any] = {"sensors": {}}
+        self._data_sheets: dict[str, SensorBelief | None] = {}
 
     def scenario(self) -> Scenario | None:
         data = dict(self._doc.data)
@@ -112,7 +115,7 @@ class _Reader:
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = self._fusion(parts["fusion"], types)
+        fusion = Fusion(self._doc, self._folder, sensors, types, self._data_sheets).read(parts["fusion"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
@@ -130,14 +133,6 @@ class _Reader:
             self._presets,
         )
 
-    def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:
-        if data is None:
-            return {}
-        if not isinstance(data, dict):
-            self._doc.find(key, f"expected a mapping, got {quoted(data)}")
-            return {}
-        return data
-
     def _with_preset(
         self, data: dict[str, Any], package: str, key: tuple[str | int, ...], default: str | None = None
     ) -> dict[str, Any] | None:
@@ -154,7 +149,7 @@ class _Reader:
 
     def _turntable(self, data: Any) -> TurntableParameters | None:
         key = ("turntable",)
-        merged = self._with_preset(self._mapping(data, key), "testbed.models", key, "air_bearing")
+        merged = self._with_preset(mapping(self._doc, data, key), "testbed.models", key, "air_bearing")
         self._presets["turntable"] = merged or {}
         return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
 
@@ -178,23 +173,24 @@ class _Reader:
         except UnknownNameError as error:
             self._doc.find((*key, kind), str(error))
             return None
-        motion = self._doc.validate(model, self._mapping(parameters, (*key, kind)), (*key, kind), self._folder)
+        motion = self._doc.validate(model, mapping(self._doc, parameters, (*key, kind)), (*key, kind), self._folder)
         return None if motion is None else (str(kind), motion)
 
     def _sensors(self, data: Any) -> tuple[dict[str, Sensor], dict[str, str]]:
         sensors: dict[str, Sensor] = {}
         types: dict[str, str] = {}
-        for name, entry in self._mapping(data, ("sensors",)).items():
+        for name, entry in mapping(self._doc, data, ("sensors",)).items():
             key = ("sensors", name)
-            merged = (
-                self._with_preset(self._mapping(entry, key), "testbed.sensors", key)
-                if self._good_name(name, key)
-                else None
-            )
-            if merged is None:
+            given = mapping(self._doc, entry, key) if is_name(self._doc, name, key) else None
+            merged = None if given is None else self._with_preset(given, "testbed.sensors", key)
+            if given is None or merged is None:
                 continue
+            if "belief" in merged and "belief" not in given:
+                # What the preset's data sheet supports; it is no parameter of the sensor.
+                del merged["belief"]
+                self._data_sheets[name] = preset_belief(str(given["preset"]))
             self._presets["sensors"][name] = dict(merged)
-            kind = self._type(merged.pop("type", name), key)
+            kind = kind_of(self._doc, merged.pop("type", name), key)
             if kind is None:
                 continue
             types[name] = kind
@@ -208,82 +204,10 @@ class _Reader:
                 sensors[name] = sensor
         return sensors, types
 
-    def _fusion(self, data: Any, types: Mapping[str, str]) -> dict[str, FilterSpec]:
-        specs = {}
-        for name, entry in self._mapping(data, ("fusion",)).items():
-            key = ("fusion", name)
-            if self._good_name(name, key):
-                spec = self._filter(name, dict(self._mapping(entry, key)), types, key)
-                if spec is not None:
-                    specs[name] = spec
-        return specs
-
-    def _filter(
-        self, name: str, entry: dict[str, Any], types: Mapping[str, str], key: tuple[str | int, ...]
-    ) -> FilterSpec | None:
-        kind = self._type(entry.pop("type", name), key)
-        believed = entry.pop("belief", "eq39")
-        if kind is None:
-            return None
-        try:
-            factory = resolve("filter", kind, FILTERS)
-            belief = self._belief(believed, types, key)
-        except UnknownNameError as error:
-            self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
-            return None
-        model = getattr(factory, "Parameters", None)
-        parameters = entry if model is None else self._doc.validate(model, entry, key, self._folder)
-        if parameters is None or belief is None:
-            return None
-        return FilterSpec(kind, factory, parameters, belief, believed)
-
-    def _belief(
-        self, believed: Any, types: Mapping[str, str], key: tuple[str | int, ...]
-    ) -> Mapping[str, SensorBelief] | None:
-        """Return what the filter believes of each sensor: by the sensor's name, or else by its type."""
-        known = self._known_belief(believed, (*key, "belief"))
-        if known is None:
-            return None
-        belief = {}
-        for name, kind in types.items():
-            entry = known.get(name, known.get(kind))
-            if entry is None:
-                self._doc.find(
-                    (*key, "belief"), f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                )
-                return None
-            belief[name] = entry
-        return belief
-
-    def _known_belief(self, believed: Any, key: tuple[str | int, ...]) -> Mapping[str, SensorBelief] | None:
-        """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
-        if isinstance(believed, str):
-            try:
-                return load_belief(believed)
-            except UnknownNameError as error:
-                self._doc.find(key, str(error))
-                return None
-        if not isinstance(believed, dict):
-            self._doc.find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(believed)}")
-            return None
-        read = {
-            str(name): self._doc.validate(SensorBelief, value, (*key, name), self._folder)
-            for name, value in believed.items()
-        }
-        known = {name: one for name, one in read.items() if one is not None}
-        return known if len(known) == len(read) else None
-
-    def _type(self, given: Any, key: tuple[str | int, ...]) -> str | None:
-        """Return the name of a part's kind; None, with the finding noted, if it is no name."""
-        if isinstance(given, str):
-            return given
-        self._doc.find((*key, "type"), f"expected a name, got {quoted(given)}")
-        return None
-
     def _expect(self, data: Any) -> tuple[Bound, ...]:
         bounds = []
-        for subject, metrics in self._mapping(data, ("expect",)).items():
-            for metric, text in self._mapping(metrics, ("expect", subject)).items():
+        for subject, metrics in mapping(self._doc, data, ("expect",)).items():
+            for metric, text in mapping(self._doc, metrics, ("expect", subject)).items():
                 match = _BOUND.fullmatch(text) if isinstance(text, str) else None
                 try:
                     bounds.append(Bound(str(subject), str(metric), *_relation(match)))
@@ -292,12 +216,6 @@ class _Reader:
                         ("expect", subject, metric), f"expected a bound such as '< 0.0143', got {quoted(text)}"
                     )
         return tuple(bounds)
-
-    def _good_name(self, name: Any, key: tuple[str | int, ...]) -> bool:
-        if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
-            return True
-        self._doc.find(key, f"expected a name of letters, digits and underscores, got {quoted(name)}")
-        return False
 
 
 def at_temperature(sensor: Sensor, temperature: float) -> Sensor:

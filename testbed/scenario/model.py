@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field
 
 from testbed.document import Document
+from testbed.fusion.belief import declared
 from testbed.inputs.plain import plain_tree
 from testbed.models.motion import MotionProfile
 from testbed.models.temperature import ROOM, TemperatureProfile
@@ -105,7 +106,6 @@ class FilterSpec:
     factory: Callable[..., Any]
     parameters: Any
     belief: Mapping[str, SensorBelief]
-    belief_name: Any
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ class Scenario:
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
             "fusion": {
-                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
             "expect": _expectations(self.expect),
@@ -279,6 +279,12 @@ def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
     written = part.model_dump(mode="json", context={"border": True, "folder": folder})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def _belief(spec: FilterSpec) -> dict[str, Any] | str:
+    """Return what a filter believes; the exact belief as the word, since the sensors stand beside it."""
+    word = declared(spec.belief)
+    return word if word == "exact" else {name: dump(one) for name, one in spec.belief.items()}
 
 
 def _parameters(spec: FilterSpec) -> dict[str, Any]:

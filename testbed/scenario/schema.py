@@ -11,6 +11,11 @@ from testbed.parts import preset_names, resolve
 from testbed.scenario.model import Frame
 from testbed.sensors import SENSORS
 
+_BELIEF = (
+    "What the filter believes of the sensors: the name of a shipped belief, 'exact' for the simulator's own response "
+    "and noise, or a mapping; by default what the data sheets of the sensors' presets support"
+)
+
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a scenario file, for editors."""
@@ -80,5 +85,5 @@ def _sensor(name: str, model: dict[str, Any]) -> dict[str, Any]:
 
 def _filter(name: str, part: Any) -> dict[str, Any]:
     model = _optional(part(resolve("filter", name, FILTERS).Parameters))
-    extra = {"type": {"type": "string"}, "belief": {"type": ["string", "object"]}}
+    extra = {"type": {"type": "string"}, "belief": {"type": ["string", "object"], "description": _BELIEF}}
     return {**model, "properties": {**model["properties"], **extra}}

@@ -35,6 +35,6 @@ def load_preset(name: str) -> Sensor:
         If there is no such preset; the message gives the nearest name and the known ones.
     """
     content = preset(__name__, name)
-    values = {key: value for key, value in content.items() if key != "type"}
+    values = {key: value for key, value in content.items() if key not in ("type", "belief")}
     model = resolve("sensor", content["type"], SENSORS)
     return cast("Sensor", model.model_validate(values, context={"border": True}))
