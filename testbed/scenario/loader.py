@@ -17,7 +17,7 @@ from testbed.scenario.checks import cross_check
 from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.model import Bound, Frame, Scenario
-from testbed.sensors import SENSORS
+from testbed.sensors import SENSORS, with_preset
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
@@ -142,6 +142,8 @@ class _Reader:
         if name is None:
             return rest
         try:
+            if package == "testbed.sensors":
+                return with_preset(str(name), rest)
             return merge(preset(package, str(name)), rest)
         except UnknownNameError as error:
             self._doc.find((*key, "preset"), str(error))

@@ -150,6 +150,17 @@ class Sensor(Part):
             raise sheet.refusal(cls.__name__)
         return found
 
+    def sheet_belief(self) -> dict[str, Any]:
+        """Return what its data sheet lets a filter believe: the fields of a belief, in SI.
+
+        Raises
+        ------
+        ValueError
+            If a data sheet of this kind of instrument says too little.
+        """
+        msg = f"{type(self).__name__}: a data sheet says too little of it; name a belief, or take 'belief: exact'"
+        raise ValueError(msg)
+
     def doubts(self) -> list[str]:
         """Return what does not fit together although each value may be right, for people to read."""
         return []

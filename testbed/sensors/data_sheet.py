@@ -219,27 +219,3 @@ def low_pass(bandwidth: float, order: int) -> dict[str, Any]:
         return {"corner": bandwidth, "damping": math.sqrt(0.5)}
     numerator, denominator = butter(order, 2.0 * np.pi * bandwidth, analog=True)
     return {"numerator": tuple(map(float, numerator)), "denominator": tuple(map(float, denominator))}
-
-
-def lay_over(
-    base: Mapping[str, Any], entry: Mapping[str, Any], ways: tuple[tuple[tuple[str, ...], ...], ...]
-) -> dict[str, Any]:
-    """Return the keys of `base` that stay when `entry` is laid over it: what it says in other words goes.
-
-    Parameters
-    ----------
-    base, entry : mapping
-        Of a preset, and of its user.
-    ways : tuple
-        For each quantity, the sets of keys that say it.
-    """
-    gone = {
-        key
-        for quantity in ways
-        for said in quantity
-        if any(k in entry for k in said)
-        for other in quantity
-        if other != said
-        for key in other
-    }
-    return {key: value for key, value in base.items() if key not in gone}

@@ -159,6 +159,18 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
 
+    def sheet_belief(self) -> dict[str, Any]:
+        """Return low-pass, white noise before it and rounding behind it; see `Sensor.sheet_belief`."""
+        numerator, denominator = self.transfer_function
+        rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate) ** 0.5
+        return {
+            "numerator": numerator,
+            "denominator": denominator,
+            "input_noise": self.angle_random_walk,
+            # Of a fine word it keeps R positive and changes nothing.
+            "output_noise": max(rounding, 3e-4 * self.angle_random_walk),
+        }
+
     def output_rms(self) -> float:
         """Return the noise of the readings from 0.1 Hz up, all that folds in and the rounding included [rad/s]."""
         freq = np.geomspace(0.1, 1e6, 4000)
