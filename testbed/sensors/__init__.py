@@ -35,7 +35,7 @@ def with_preset(name: str, entry: Mapping[str, Any]) -> dict[str, Any]:
     UnknownNameError
         If there is no such preset.
     """
-    base = {key: value for key, value in preset(__name__, name).items() if key != "class"}
+    base = preset(__name__, name)
     kind = entry.get("type", base["type"])
     if kind in SENSORS:
         base = lay_over(base, entry, resolve("sensor", kind, SENSORS).ways())
@@ -60,7 +60,7 @@ def load_preset(name: str) -> Sensor:
     UnknownNameError
         If there is no such preset; the message gives the nearest name and the known ones.
     """
-    content = with_preset(name, {})
+    content = preset(__name__, name)
     values = {key: value for key, value in content.items() if key not in ("type", "belief")}
     model = resolve("sensor", content["type"], SENSORS)
     return cast("Sensor", model.model_validate(values, context={"border": True}))

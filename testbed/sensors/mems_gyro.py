@@ -239,7 +239,7 @@ class MemsGyroStage:
         self._decimator: Decimator | AgedSampler = Decimator(ratio)
         if gyro.jitter:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
-        self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.range, rounding=gyro.noise)
+        self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.full_scale(), rounding=gyro.noise)
         self._losses = stream("dropped")
 
     def process(self, true_rate: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -221,8 +222,10 @@ REAL = [
 
 def test_there_are_twelve_parts_in_the_words_of_their_sheets() -> None:
     assert len(REAL) >= 12
-    classes = {preset("testbed.sensors", name)["class"] for name in preset_names("testbed.sensors")}
-    assert classes == {"consumer MEMS", "industrial MEMS", "tactical MEMS", "FOG", "RLG", "MHD ARS"}
+    folder = resources.files("testbed.sensors") / "presets"
+    heads = [(folder / f"{name}.yaml").read_text(encoding="utf-8").splitlines()[0] for name in REAL]
+    for kind in ("consumer", "industrial", "tactical", "Fibre-optic", "Ring-laser"):
+        assert any(kind in head for head in heads)
 
 
 @pytest.mark.parametrize("name", REAL)
