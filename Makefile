@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline changes readme clean
+.PHONY: run view test lint bench baseline changes readme pictures clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -46,6 +46,10 @@ baseline: .venv/installed-test
 # The table of commands in README.md.
 readme: .venv/installed-test
 	$(BIN)/python -m tests.project.readme
+
+# The picture of the rooms in docs/architecture.md.
+pictures: .venv/installed-test
+	$(BIN)/python -m tests.project.picture
 
 # What the next release says, from the files in changes/; without --draft it goes into CHANGELOG.md and they go away.
 changes: .venv/installed-test

@@ -66,10 +66,10 @@ class Document:
         if found:
             raise ScenarioError(found)
 
-    def validate(self, model: type[Model], data: Any, key: Key, folder: Path) -> Model | None:
+    def validate(self, model: type[Model], data: Any, key: Key, folder: Path, **context: Any) -> Model | None:
         """Validate `data`, found at `key`, as `model`; note what is wrong and return None then."""
         try:
-            return model.model_validate(data, context={"border": True, "folder": folder})
+            return model.model_validate(data, context={"border": True, "folder": folder, **context})
         except ValidationError as error:
             for place, message in findings(error, model, data):
                 self.find((*key, *place), message)

@@ -15,6 +15,8 @@ from testbed.errors import Problem, ScenarioError, UnknownNameError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.inputs.plugins import Plugins
+
 
 class Part(BaseModel):
     """Frozen parameters of one block of the chain; SI floats from Python, strings with units from YAML."""
@@ -53,27 +55,33 @@ class Part(BaseModel):
             raise ScenarioError(problems) from error
 
 
-def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:
+def resolve(kind: str, name: str, registry: Mapping[str, str], plugins: Plugins | None = None) -> type[Any]:
     """Import the class that `registry` (name -> ``package.module:Class``) knows as `name`.
 
-    A `name` that contains a colon is a user's own ``package.module:Class``.
+    Parameters
+    ----------
+    kind : str
+        What it is, for messages and entry points.
+    name : str
+        Name of the registry or, given `plugins`, of an installed package's entry point, or ``module:Class``.
+    registry : mapping of str to str
+        The shipped ones.
+    plugins : Plugins, optional
+        Those that may be asked; a scenario's name alone loads no code.
 
     Raises
     ------
     UnknownNameError
-        If the name, the module or the class does not exist.
+        If there is no such class.
     """
-    target = name if ":" in name else registry.get(name)
-    if target is None:
+    if plugins is not None:
+        part = plugins.part(kind, name, registry) if ":" in name else plugins.installed(kind, name, registry)
+        if part is not None:
+            return part
+    if name not in registry:
         raise UnknownNameError(kind, name, registry)
-    module, _, attribute = target.partition(":")
-    try:
-        return cast("type[Any]", getattr(importlib.import_module(module), attribute))
-    except Exception as error:
-        # A user's own module may fail in any way; one of ours that does is our fault and keeps its traceback.
-        if ":" not in name:
-            raise
-        raise UnknownNameError(kind, name, registry, reason=f"{type(error).__name__}: {error}") from error
+    module, _, attribute = registry[name].partition(":")
+    return cast("type[Any]", getattr(importlib.import_module(module), attribute))
 
 
 def preset_names(package: str) -> list[str]:

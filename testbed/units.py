@@ -28,7 +28,8 @@ from testbed.errors import quoted
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
-DEG_H = math.radians(1.0) / 3600.0  # rad/s
+DEG = math.radians(1.0)  # rad
+DEG_H = DEG / 3600.0  # rad/s
 CELSIUS = 273.15  # K, 0 degC
 
 _DEFINITIONS = """
@@ -161,6 +162,14 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     ------
     ValueError
         If the number, the unit or the dimension is wrong; NaN and infinity are refused.
+
+    Examples
+    --------
+    >>> parse("20 kHz", "Hz")
+    20000.0
+    >>> parse("10 rad/s", "Hz")
+    Traceback (most recent call last):
+    ValueError: expected a quantity in Hz, got '10 rad/s': 'rad/s' has the wrong dimension
     """
     expected = _expectation(si, example)
     if len(text) > _MOST_TEXT:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from testbed.drift.summary import LETTERS, summary
+from testbed.drift.summary import LETTERS, audit_summary
 from testbed.pages.numbers import significant
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def print_audit(audited: Audited, folder: Path) -> None:
     folder : Path
         Where its page is.
     """
-    console, figures = Console(soft_wrap=True), summary(audited.audit)
+    console, figures = Console(soft_wrap=True), audit_summary(audited.audit)
     table = Table("", "100 s std", "sigma 1 h", *LETTERS, title=f"{audited.thermal.name}: {audited.method}")
     names = {"before": "record", "after": "compensated", "low_passed": "equal low-pass", "oracle": "oracle"}
     for key, label in names.items():

@@ -17,6 +17,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
+PluginModules = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="MODULE",
+        help="Module, dotted or as the path of a .py, to load first: it runs with your rights. May be repeated.",
+    ),
+]
+AllowOutside = Annotated[
+    bool, typer.Option("--allow-outside", help="Let a recorded motion lie outside the scenario's folder.")
+]
 RunDir = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run folder.")]
 
 
@@ -81,7 +92,7 @@ def expanded(command: Callable[..., None]) -> Callable[..., None]:
     """Replace each parameter of a command that is a dataclass by an option for each of its fields.
 
     So options that several commands share are written once. The metadata of a field give its `option` and its `help`,
-    and may give its `metavar`.
+    and may give its `metavar`; a class may name the `PANEL` of the help in which its options stand together.
 
     Parameters
     ----------
@@ -120,6 +131,7 @@ def _is_group(hint: Any) -> bool:
 
 def _option(part: dataclasses.Field[Any], kind: type) -> inspect.Parameter:
     words = part.metadata
-    option = typer.Option(words["option"], help=words["help"], metavar=words.get("metavar"))
+    panel = getattr(kind, "PANEL", None)
+    option = typer.Option(words["option"], help=words["help"], metavar=words.get("metavar"), rich_help_panel=panel)
     annotation: Any = Annotated[get_type_hints(kind)[part.name], option]
     return inspect.Parameter(part.name, inspect.Parameter.KEYWORD_ONLY, default=part.default, annotation=annotation)

@@ -162,9 +162,10 @@ def _print_budget(console: Console, budget: Budget | None) -> None:
 def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = _console()
-    table = Table(
-        "key", "as written", "understood (SI)", title=f"{scenario.name}: {scenario.file}", title_justify="left"
-    )
+    table = Table(title=f"{scenario.name}: {scenario.file}", title_justify="left")
+    for heading in ("key", "as written", "understood (SI)"):
+        # Folded, never cut: a key is one long word.
+        table.add_column(heading, overflow="fold")
     for key, value in understood(scenario).items():
         table.add_row(key, value["written"], value["si"])
     console.print(table)
@@ -216,7 +217,7 @@ def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
 
     console = _console()
     for analysis in analyses:
-        console.print(f"[bold]{analysis.record.content}[/bold]", soft_wrap=True, highlight=False)
+        console.print(analysis.record.content, style="bold", soft_wrap=True, highlight=False, markup=False)
         console.print(
             f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz", highlight=False
         )

@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from testbed.drift.figures import allan_figure, drift_figure, gain_figure
-from testbed.drift.summary import summary
+from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
+from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.pages.template import render
 from testbed.runs.atomic import write_text
@@ -70,7 +70,7 @@ def write_audit(audited: Audited, folder: Path) -> Path:
         "audit.json": json.dumps(audit_document(audited), indent=2, allow_nan=False) + "\n",
         "gains.csv": _gains(audited.audit),
         "allan.csv": _allan(curves(audited.audit)),
-        "audit.html": _page(audited, summary(audited.audit)),
+        "audit.html": _page(audited, audit_summary(audited.audit)),
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -85,7 +85,7 @@ def audit_document(audited: Audited) -> dict[str, Any]:
         "trained_on": list(audited.trained_on),
         "record": audited.thermal.name,
         "extrapolated": audited.extrapolated,
-        **summary(audited.audit),
+        **audit_summary(audited.audit),
     }
 
 
@@ -118,7 +118,7 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
     record = audited.thermal.record
     drawn = {
         "drift": drift_figure(record, audited.compensated, audited.thermal.drift),
-        "allan": allan_figure(curves(audited.audit)),
+        "allan": residual_allan_figure(curves(audited.audit)),
         "gain": gain_figure(audited.audit),
     }
     return render(

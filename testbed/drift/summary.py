@@ -12,7 +12,7 @@ from testbed.judging.allan_analysis import TERMS
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
-    from testbed.allan import AllanFit
+    from testbed.allan.fit import AllanFit
     from testbed.drift.leak import Audit
     from testbed.drift.quality import Quality
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LETTERS = ("Q", "N", "B")
 
 
-def summary(audit: Audit) -> dict[str, Any]:
+def audit_summary(audit: Audit) -> dict[str, Any]:
     """Return the figures of an audit; None where they are not known or mean nothing.
 
     Parameters

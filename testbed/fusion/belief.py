@@ -201,6 +201,14 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     ValueError
         If a transfer function or a noise is not acceptable, or the exact belief is asked for: only who knows the
         simulated sensors has that.
+
+    Examples
+    --------
+    >>> sorted(load_belief("eq39"))
+    ['mems_gyro', 'mhd_ars']
+    >>> own = {"gyro": {"numerator": [1.0], "denominator": [0.01, 1.0], "output_noise": "0.3 deg/sqrt(h)"}}
+    >>> load_belief(own)["gyro"].denominator
+    (0.01, 1.0)
     """
     if source == "exact":
         msg = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,6 +108,7 @@ class Judge:
             "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)
 

@@ -41,7 +41,7 @@ class Signals(Mapping[str, "FloatArray"]):
     >>> group = kept({"rate": np.array([0.0, 0.1, 0.2])}, {"rate": "rad/s"}, sample_rate_hz=10.0)
     >>> group
     Signals(time [s], rate [rad/s]; 3 samples at 10 Hz)
-    >>> group.rate[-1] == group["rate"][-1] == 0.2
+    >>> float(group.rate[-1]) == float(group["rate"][-1]) == 0.2
     True
     >>> group.units["rate"]
     'rad/s'

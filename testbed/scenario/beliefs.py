@@ -54,6 +54,13 @@ def belief_of(name: str, *, exact: bool = False) -> SensorBelief:
         If there is no such preset.
     ValueError
         If its data sheet supports no belief, or no rational model comes close to it.
+
+    Examples
+    --------
+    >>> belief_of("sx300").source
+    'eq39'
+    >>> belief_of("sx300", exact=True).source
+    'exact'
     """
     if exact:
         return exact_belief(load_preset(name))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +12,11 @@ from testbed.models.motion import MotionProfile
 from testbed.models.turntable.modal import check_modal
 from testbed.models.turntable.servo import required_torque
 from testbed.models.turntable.turntable import Turntable
-from testbed.signals import BASE_RATE_HZ, random_stream
+from testbed.signals import BASE_RATE_HZ, BLOCK
 
 if TYPE_CHECKING:
-    from testbed.models.turntable.turntable import TruthBlock, TurntableParameters
+    from testbed.models.turntable.parameters import TurntableParameters
+    from testbed.models.turntable.turntable import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 
@@ -24,7 +24,7 @@ TRUTH_ERROR = 1e-6
 # What is measured on an excerpt may be at most half of what is promised for the run.
 _MARGIN = 2.0
 _MOST_HOLDS = 8
-_EXCERPT, _RAMP_IN, _BLOCK = 5000, 0.05, 20_000
+_EXCERPT, _RAMP_IN = 5000, 0.05
 # A table that does not move has no rate to compare with [rad/s].
 _LEAST_RATE = 1e-6
 _LEAPS = ("servo", "ideal")
@@ -186,8 +186,7 @@ class _Excerpts:
         self._scenario = scenario
         self._n_time = min(_EXCERPT, scenario.n_time)
         # A floor moves on its own: whatever it does, it does under both.
-        stream = partial(random_stream, scenario.frame.seed, "turntable", "floor")
-        self._floor = scenario.turntable.floor.start(self._n_time / BASE_RATE_HZ, stream)
+        self._floor = scenario.floor(self._n_time / BASE_RATE_HZ)
         places, self._scale = _hardest(scenario)
         last = scenario.n_time - self._n_time
         starts = sorted({min(max(k - self._n_time // 2, 0), last) for k in places})
@@ -219,8 +218,8 @@ def _rates(truth: TruthBlock) -> tuple[FloatArray, ...]:
 def _hardest(scenario: Scenario) -> tuple[list[int], float]:
     """Return the base steps of largest rate, torque and third derivative of the rate, and the largest rate."""
     motion, peaks, places = scenario.profile(), [-1.0] * 3, [0] * 3
-    for start in range(0, scenario.n_time, _BLOCK):
-        command = motion.process(min(_BLOCK, scenario.n_time - start))
+    for start in range(0, scenario.n_time, BLOCK):
+        command = motion.process(min(BLOCK, scenario.n_time - start))
         torque = required_torque(scenario.turntable, command, BASE_RATE_HZ)
         for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
             if measure.size and float(np.max(measure)) > peaks[i]:

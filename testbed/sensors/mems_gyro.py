@@ -113,8 +113,8 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     def _young_enough(self) -> Self:
         if self.jitter > 1.0 / self.sample_rate:
             msg = (
-                f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, got "
-                f"{self.jitter!r} s"
+                f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, "
+                f"got {self.jitter!r} s"
             )
             raise ValueError(msg)
         return self

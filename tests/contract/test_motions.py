@@ -46,7 +46,8 @@ def test_every_motion_has_an_example_here():
 
 def test_every_concrete_motion_is_registered():
     registered = {resolve("motion", name, MOTIONS) for name in MOTIONS}
-    assert set(Motion.__subclasses__()) <= registered
+    ours = {part for part in Motion.__subclasses__() if part.__module__.startswith("testbed.")}
+    assert ours <= registered
 
 
 @pytest.mark.parametrize("name", MOTIONS)

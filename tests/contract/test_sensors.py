@@ -29,7 +29,7 @@ def record(n=20_000):
 
 
 def test_every_concrete_sensor_is_registered():
-    ours = {sensor for sensor in Sensor.__subclasses__() if sensor.__module__.startswith("testbed.")}
+    ours = {part for part in Sensor.__subclasses__() if part.__module__.startswith("testbed.")}
     assert ours <= {resolve("sensor", name, SENSORS) for name in SENSORS}
 
 

@@ -8,34 +8,31 @@ from typing import Annotated
 import typer
 
 from testbed.cli.options import Output, expanded
+from testbed.logs.selection import Selection, TextOptions
 
 
 @expanded
 def allan(
-    source: Annotated[Path, typer.Argument(metavar="FILE_OR_RUN", help="Text file with a rate record, or run folder.")],
+    source: Annotated[Path, typer.Argument(metavar="FILE_OR_RUN", help="Recording of any format, or run folder.")],
     output: Output,
+    wanted: Selection,
+    text: TextOptions,
     out: Annotated[Path | None, typer.Option(help="Plot (.svg, .png, .pdf); default runs/allan_<name>.svg.")] = None,
-    column: Annotated[str | None, typer.Option(help="Column of a file by name, or by number from 1 on.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of the column, such as deg/s.")] = None,
-    rate: Annotated[str | None, typer.Option(metavar="FREQUENCY", help="Sample rate of a file.")] = None,
-    time: Annotated[str | None, typer.Option(help="Column of the time, instead of --rate.")] = None,
-    time_unit: Annotated[str, typer.Option(help="Unit of the time.")] = "s",
     sensor: Annotated[str | None, typer.Option(help="Sensor of a run; default all.")] = None,
     min_tau: Annotated[str | None, typer.Option(metavar="TIME", help="Shortest averaging time of the fit.")] = None,
     max_tau: Annotated[str | None, typer.Option(metavar="TIME", help="Longest averaging time of the fit.")] = None,
 ) -> None:
-    """Print the Allan coefficients of a record or of a run's sensors, and draw the deviation."""
+    """Print the Allan coefficients of recorded rates or of a run's sensors, and draw the deviation."""
     from testbed.cli.terminal import print_allan
     from testbed.judging.allan_analysis import allan_figure, analyse, figure_format, write_figure
     from testbed.judging.allan_records import read
-    from testbed.runs.text import quantity
+    from testbed.logs.options import quantity
 
     if out is not None:
         figure_format(out)
     shortest = None if min_tau is None else quantity(min_tau, "s", "10 s", "--min-tau")
     longest = None if max_tau is None else quantity(max_tau, "s", "10 s", "--max-tau")
-    options = {"column": column, "unit": unit, "rate": rate, "time": time, "sensor": sensor}
-    analyses = [analyse(record, shortest, longest) for record in read(source, time_unit=time_unit, **options)]
+    analyses = [analyse(record, shortest, longest) for record in read(source, wanted, text, sensor)]
     name = analyses[0].record.name if len(analyses) == 1 else source.resolve().name
     figure = write_figure(allan_figure(analyses), out or Path("runs") / f"allan_{name}.svg")
     document = {"records": [analysis.summary() for analysis in analyses], "written": str(figure)}

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from testbed.fusion.filters.shakf import AdaptiveFilter
-from testbed.fusion.model_filter import DEG, CovarianceParameters, Variance
-from testbed.units import PositiveDuration
+from testbed.fusion.model_filter import CovarianceParameters, Variance
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -11,8 +11,7 @@ from pydantic import BeforeValidator, Field
 from testbed.fusion.bands import Bands, load_bands
 from testbed.fusion.base import Rows
 from testbed.fusion.filters.shakf import SageHusa, SageHusaParameters
-from testbed.fusion.model_filter import DEG
-from testbed.units import PositiveDuration
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -13,8 +13,8 @@ from pydantic import Field
 from testbed.fusion.base import Rows
 from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.model import build_model
-from testbed.fusion.model_filter import DEG, FormParameters, ModelFilter
-from testbed.units import PositiveDuration
+from testbed.fusion.model_filter import FormParameters, ModelFilter
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

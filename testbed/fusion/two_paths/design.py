@@ -1,4 +1,4 @@
-r"""Two sensors, each through a fixed linear path: what the complementary and the blending filter share.
+r"""The design of two fixed paths from the belief: low-passes, inverses, and the crossover of least noise.
 
 The fast path inverts the sensor that is quieter at high frequency, up to a bandwidth; the slow path takes the other one
 over below a crossover. Both are low-passes of the form that the settled Kalman filter of a signal of order m has,

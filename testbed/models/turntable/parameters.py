@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from testbed.models.turntable.earth import EarthRate
 from testbed.models.turntable.floor import Floor
 from testbed.parts import Part
+from testbed.signals import BASE_RATE_HZ
 from testbed.units import Angle, AngularDrag, Frequency, Inertia, Length, Mass, Position, Quantity, Torque
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ class Digital(Part):
     """
 
     encoder_bits: Annotated[int, Field(ge=8, le=40)] = 24
-    controller_rate: Frequency = 20000.0
+    controller_rate: Frequency = BASE_RATE_HZ
     velocity_filter: Frequency = 600.0
     ripple: tuple[Ripple, ...] = (Ripple(relative=0.005, periods=12),)
 

@@ -15,8 +15,7 @@ from testbed.models.turntable.digital import DigitalLoop, check_loop
 from testbed.models.turntable.disturbances import Disturbances, check_floor
 from testbed.models.turntable.engine import Engine
 from testbed.models.turntable.modal import ModalEngine, check_modal
-from testbed.models.turntable.parameters import Cogging, Mounting, TurntableParameters
-from testbed.models.turntable.servo import required_torque
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -24,11 +23,10 @@ if TYPE_CHECKING:
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.earth import EarthRate
     from testbed.models.turntable.floor import FloorMotion
+    from testbed.models.turntable.parameters import Mounting, TurntableParameters
     from testbed.signals import FloatArray
 
     Poses = dict[str, tuple[FloatArray, FloatArray]]
-
-__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
 
 
 @dataclass(frozen=True)
@@ -103,13 +101,25 @@ class Turntable:
         modes are asked for where they do not hold.
     ValueError
         If the floor moves and `floor` is not given.
+
+    Examples
+    --------
+    A tenth of a second of a 10 Hz swing, and what a sensor on the table feels of it.
+
+    >>> from testbed.models.motion import MotionProfile
+    >>> from testbed.models.turntable import Mounting, TurntableParameters
+    >>> motion = MotionProfile([lambda t: 0.01 * np.sin(20.0 * np.pi * t)], 0.0, BASE_RATE_HZ)
+    >>> table = Turntable(TurntableParameters(), {"gyro": Mounting()})
+    >>> truth = table.process(motion.process(2000))
+    >>> round(float(truth.sensor_rate["gyro"].max()), 3)
+    0.01
     """
 
     def __init__(
         self,
         parameters: TurntableParameters,
         mountings: Mapping[str, Mounting],
-        sample_rate_hz: float = 20000.0,
+        sample_rate_hz: float = BASE_RATE_HZ,
         *,
         substeps: int = 1,
         holds: int = 1,

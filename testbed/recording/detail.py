@@ -16,23 +16,27 @@ if TYPE_CHECKING:
 N_BINS = 4000  # more than a screen has columns, so min and max per bin draw the same picture as every sample
 
 
-class Envelope:
+class Detail:
     """Choose real samples of a stream so that no extreme is lost: argmin and argmax per bin, every sample of a window.
 
     Bins are counted from sample 0, so any division of the stream into blocks chooses the same samples. The first and
-    the last sample are always among them; samples that are not finite never are (they cannot be drawn).
+    the last sample are always among them. Unlike the envelope of a page, which keeps two numbers per bin, this one
+    keeps samples with their own times, sends them on block by block and has a window without bins.
 
     Parameters
     ----------
     n_samples : int
         Length of the whole stream; a bin holds ceil(n_samples / 4000) samples.
-    detail : tuple of int
+    window : tuple of int
         First index of the window and the index behind its last one.
+    gaps : bool, optional
+        Samples that are not finite were lost and leave a gap: NaN, which the viewer draws no line to, stands for each
+        of them in the window and for each bin that has no finite one. Otherwise they were not due, and are left out.
     """
 
-    def __init__(self, n_samples: int, detail: tuple[int, int]) -> None:
+    def __init__(self, n_samples: int, window: tuple[int, int], *, gaps: bool = False) -> None:
         self._width = max(1, -(-n_samples // N_BINS))
-        self._detail = detail
+        self._window, self._gaps = window, gaps
         self._start = 0
         self._open: FloatArray = np.empty(0)
 
@@ -69,14 +73,14 @@ class Envelope:
         first_of_bin = np.arange(0, values.size, bins.shape[1])
         keep[first_of_bin + _arg_extreme(bins, np.argmin, np.inf)] = True
         keep[first_of_bin + _arg_extreme(bins, np.argmax, -np.inf)] = True
-        window = np.clip(np.array(self._detail) - self._start, 0, values.size)
+        window = np.clip(np.array(self._window) - self._start, 0, values.size)
         keep[window[0] : window[1]] = True
         keep[0] |= self._start == 0
         keep[-1] |= last
-        chosen = np.flatnonzero(keep)
-        chosen = chosen[np.isfinite(values[chosen])]
+        finite = np.isfinite(values)
+        chosen = np.flatnonzero(keep if self._gaps else keep & finite)
         start, self._start = self._start, self._start + values.size
-        return chosen + start, values[chosen]
+        return chosen + start, np.where(finite[chosen], values[chosen], np.nan)
 
 
 def _arg_extreme(bins: FloatArray, choose: Callable[..., NDArray[np.intp]], filler: float) -> NDArray[np.intp]:

@@ -17,7 +17,9 @@ from testbed.reproduce.paper1.data import (
     slip_error,
     stepped_sine,
 )
-from testbed.reproduce.paper1.runs import BASE_HZ, DEG, SENSORS, Protocol, presets
+from testbed.reproduce.paper1.runs import SENSORS, FusionProtocol, presets
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 
 @pytest.fixture(scope="module")
@@ -94,8 +96,8 @@ def test_figure_7_formula_and_measurement_agree(points) -> None:
 
 def test_figures_of_a_run_show_what_the_sensors_read() -> None:
     """Two periods from the settling time on, the sensors as equation (39) has them, errors as estimate minus truth."""
-    rate = DEG * np.sin(2 * np.pi * 4.0 * np.arange(round(4 * BASE_HZ)) / BASE_HZ)
-    tables = following(rate, "4 Hz", Protocol(4.0, 2.0))
+    rate = DEG * np.sin(2 * np.pi * 4.0 * np.arange(round(4 * BASE_RATE_HZ)) / BASE_RATE_HZ)
+    tables = following(rate, "4 Hz", FusionProtocol(4.0, 2.0))
     rates, fused, adaptation = tables["rates"], tables["fused"], tables["adaptation"]
     t = rates["time_s"]
     assert t[0] == 2.0
@@ -116,7 +118,7 @@ def test_figures_of_a_run_show_what_the_sensors_read() -> None:
 
 
 def test_a_mixed_window_shows_one_period() -> None:
-    tables = following(np.zeros(round(3 * BASE_HZ)), "mixed", Protocol(3.0, 1.0))
+    tables = following(np.zeros(round(3 * BASE_RATE_HZ)), "mixed", FusionProtocol(3.0, 1.0))
     assert tables["fused"]["time_s"][[0, -1]] == pytest.approx([1.0, 3.0], abs=1.1e-3)
 
 

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from testbed.reproduce.paper1.defects import CASES, Split, sensors_of, split
-from testbed.reproduce.paper1.runs import BASE_HZ, DEG, Protocol
+from testbed.reproduce.paper1.runs import FusionProtocol
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
-PROTOCOL = Protocol(duration=8.0, settle=6.0)
+PROTOCOL = FusionProtocol(duration=8.0, settle=6.0)
 
 
 def sine(freq_hz: float) -> np.ndarray:
-    return DEG * np.sin(2 * np.pi * freq_hz * np.arange(round(PROTOCOL.duration * BASE_HZ)) / BASE_HZ)
+    return DEG * np.sin(2 * np.pi * freq_hz * np.arange(round(PROTOCOL.duration * BASE_RATE_HZ)) / BASE_RATE_HZ)
 
 
 def test_the_cases_are_what_they_say() -> None:

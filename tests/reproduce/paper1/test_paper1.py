@@ -12,22 +12,22 @@ from testbed.models.motion import MotionProfile
 from testbed.reproduce.paper1 import PAPER, report, table_ii
 from testbed.reproduce.paper1.defects import CASES
 from testbed.reproduce.paper1.runs import (
-    BASE_HZ,
-    DEG,
     FILTERS,
     SENSORS,
     SIGNALS,
-    Protocol,
+    FusionProtocol,
     errors,
     outputs,
     presets,
     truth,
 )
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-SHORT = Protocol(duration=2.0, settle=1.0)
+SHORT = FusionProtocol(duration=2.0, settle=1.0)
 # Half of Table II, at 10 Hz three quarters; the mixed signal is half of the text's 0.0143 [deg/s].
 TARGETS = {"0.5 Hz": 0.0049, "4 Hz": 0.0035, "10 Hz": 0.0030, "mixed": 0.0071}
 
@@ -44,8 +44,8 @@ def test_one_parameter_set_meets_table_ii_on_all_four_signals(tmp_path: Path) ->
 
     SHAKF tuned at 0.5 Hz meets its own entry there and is at least ten times worse at 4 and 10 Hz.
     """
-    rates = {signal: truth(signal, Protocol()) for signal in SIGNALS}
-    print(*table_ii(rates, 10, tmp_path, Protocol()), sep="\n")
+    rates = {signal: truth(signal, FusionProtocol()) for signal in SIGNALS}
+    print(*table_ii(rates, 10, tmp_path, FusionProtocol()), sep="\n")
     rows = table(tmp_path / "table_ii.csv")
     assert len(rows) == len(SIGNALS) * (len(SENSORS) + len(FILTERS))
     for signal in SIGNALS:
@@ -63,7 +63,7 @@ def test_one_parameter_set_meets_table_ii_on_all_four_signals(tmp_path: Path) ->
 
 def test_the_signals_are_the_papers() -> None:
     """1 deg/s each; mixed: 5.555 mrad at 0.5 Hz and 50 urad at 10 Hz, 1 and 0.18 deg/s."""
-    t = np.arange(200_000) / BASE_HZ
+    t = np.arange(200_000) / BASE_RATE_HZ
     rng = np.random.default_rng()
     for signal, peaks in (("0.5 Hz", [1.0]), ("4 Hz", [1.0]), ("10 Hz", [1.0]), ("mixed", [1.0, 0.18])):
         found = [float(np.rad2deg(np.max(np.abs(sine.start(10.0, rng)(t))))) for sine in SIGNALS[signal]]
@@ -73,7 +73,7 @@ def test_the_signals_are_the_papers() -> None:
 
 def test_sensors_alone_follow_their_transfer_functions() -> None:
     """At 10 Hz the closed form of a sine through equation (39): A |G - 1| / sqrt(2), phase included."""
-    rate = DEG * np.sin(2 * np.pi * 10.0 * np.arange(round(2 * BASE_HZ)) / BASE_HZ)
+    rate = DEG * np.sin(2 * np.pi * 10.0 * np.arange(round(2 * BASE_RATE_HZ)) / BASE_RATE_HZ)
     found = errors(outputs(rate, 1, presets()), rate, "10 Hz", SHORT)
     s = 2j * np.pi * 10.0
     gyro = (154.537 * s + 15.626) / (5.2175 * s**2 + 148.0 * s + 15.444)
@@ -87,7 +87,7 @@ def test_the_truth_is_the_table_under_its_servo() -> None:
     """It follows the command but for the platform's recoil, 0.11 % of the rate (I_rotor / I_platform = 0.05 / 45)."""
     rate = truth("10 Hz", SHORT)
     terms = [sine.start(2.0, np.random.default_rng()) for sine in SIGNALS["10 Hz"]]
-    command = MotionProfile(terms, 0.5, BASE_HZ).process(rate.size).rate[:-1]
+    command = MotionProfile(terms, 0.5, BASE_RATE_HZ).process(rate.size).rate[:-1]
     off = np.max(np.abs(rate - command)[20_000:]) / np.deg2rad(1.0)
     assert 5e-4 < off < 3e-3
 
