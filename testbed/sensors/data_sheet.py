@@ -155,7 +155,7 @@ class Sheet:
         bandwidth = self._read("bandwidth", _FREQUENCY, written)
         if bandwidth is None:
             return
-        fields = low_pass(bandwidth, order)
+        fields = butterworth(bandwidth, order)
         becomes = "numerator and denominator"
         if "corner" in fields:
             becomes = f"corner: {bandwidth:.6g} Hz, damping: {fields['damping']:.6g}"
@@ -200,7 +200,7 @@ def _line(kind: str, place: tuple[str | int, ...], message: str, value: Any) -> 
     return InitErrorDetails(type=error, loc=place, input=value)
 
 
-def low_pass(bandwidth: float, order: int) -> dict[str, Any]:
+def butterworth(bandwidth: float, order: int) -> dict[str, Any]:
     r"""Return the parameters of a Butterworth low-pass, which is down by 3 dB at `bandwidth`.
 
     Parameters

@@ -14,7 +14,7 @@ from testbed.errors import ScenarioError
 from testbed.parts import preset, preset_names
 from testbed.scenario.loader import load_scenario
 from testbed.sensors import load_preset, with_preset
-from testbed.sensors.data_sheet import low_pass
+from testbed.sensors.data_sheet import butterworth
 from testbed.sensors.fog import Fog
 from testbed.sensors.mems_gyro import MemsGyro
 from testbed.sensors.mhd_ars import MhdArs
@@ -65,7 +65,7 @@ def test_bandwidth_is_where_half_the_power_is_left(order: int) -> None:
     freq = np.array([1e-3, 98.0, 196.0])
     # Butterworth: |H|^2 = 1 / (1 + (f/fc)^2n).
     np.testing.assert_allclose(np.abs(gyro.response(freq)) ** 2, 1.0 / (1.0 + (freq / 98.0) ** (2 * order)), rtol=1e-9)
-    fields = low_pass(98.0, order)
+    fields = butterworth(98.0, order)
     assert ("corner" in fields) == (order == 2)
     if order != 2:
         got = transfer(list(fields["numerator"]), list(fields["denominator"]), freq)
