@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline crash changes clean
+.PHONY: run view test lint bench baseline crash changes readme pictures clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -24,9 +24,9 @@ run: .venv/installed
 	$(BIN)/testbed run $(SCENARIO)
 
 view: .venv/installed
-	@last=$$(ls -1dt runs/*/ 2>/dev/null | head -n 1); \
+	@last=$$(ls -1t runs/*/recording.rrd 2>/dev/null | head -n 1); \
 	if [ -z "$$last" ]; then echo "no run yet: type 'make run' first" >&2; exit 2; fi; \
-	$(BIN)/testbed view "$$last"
+	$(BIN)/testbed view "$${last%/*}"
 
 lint: .venv/installed-test
 	$(BIN)/ruff check .
@@ -46,6 +46,14 @@ baseline: .venv/installed-test
 # Kills at 200 random moments of a run, a report and a training, and disks of 20 sizes: half an hour.
 crash: .venv/installed-test
 	TESTBED_CRASH_KILLS=200 TESTBED_CRASH_SIZES=20 $(BIN)/python -m pytest -s tests/crash
+
+# The table of commands in README.md.
+readme: .venv/installed-test
+	$(BIN)/python -m tests.project.readme
+
+# The picture of the rooms in docs/architecture.md.
+pictures: .venv/installed-test
+	$(BIN)/python -m tests.project.picture
 
 # What the next release says, from the files in changes/; without --draft it goes into CHANGELOG.md and they go away.
 changes: .venv/installed-test

@@ -14,9 +14,9 @@ from scipy.linalg import solve_discrete_are
 from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.signals import FloatArray, random_stream
+from testbed.units import DEG
 
 RATES = {"mems_gyro": 20000.0, "mhd_ars": 20000.0}
-DEG = np.pi / 180.0
 BLOCK = 100_000
 
 

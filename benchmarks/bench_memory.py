@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PROGRAM = (
-    "import resource, sys\nfrom testbed.cli.app import main\n"
+    "import resource, sys\nfrom testbed.cli import main\n"
     "sys.argv = ['testbed', 'run', sys.argv[1], '--out', sys.argv[2]]\n"
     "try:\n    main()\nfinally:\n    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)\n"
 )

@@ -15,11 +15,11 @@ from scipy.signal import lsim
 
 from testbed.models.mhd_channel.channel import MhdChannel
 from testbed.models.mhd_channel.chebyshev import even_operators
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-FS = 20000.0
 CHANNEL = MhdChannel(fluid="mercury", height=15e-3, field=0.448)
 
 
@@ -33,7 +33,7 @@ def best_of(repeats: int, work: Callable[[], object]) -> float:
 
 
 def sine(freq: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    t = np.arange(round(duration * FS)) / FS
+    t = np.arange(round(duration * BASE_RATE_HZ)) / BASE_RATE_HZ
     return t, np.sin(2 * np.pi * freq * t)
 
 
@@ -48,8 +48,8 @@ def numpy_recursion(wall: np.ndarray) -> np.ndarray:
     A, mean = operators()
     values, vectors = np.linalg.eig(A)
     gain = (mean @ vectors) * np.linalg.solve(vectors, np.ones(mean.size))
-    E = np.exp(values / FS)
-    push = np.expm1(values / FS) / (values / FS)
+    E = np.exp(values / BASE_RATE_HZ)
+    push = np.expm1(values / BASE_RATE_HZ) / (values / BASE_RATE_HZ)
     z = np.full(mean.size, wall[0])
     out = np.empty(wall.size)
     out[0] = gain @ z
@@ -63,14 +63,14 @@ def scipy_lsim(wall: np.ndarray) -> np.ndarray:
     """Run SciPy's first-order hold on the same grid; x = slip + wall velocity makes the input a velocity."""
     A, mean = operators()
     system = (A, -A @ np.ones((mean.size, 1)), -mean[None, :], np.array([[mean.sum()]]))
-    return np.asarray(lsim(system, wall, np.arange(wall.size) / FS)[1])
+    return np.asarray(lsim(system, wall, np.arange(wall.size) / BASE_RATE_HZ)[1])
 
 
 def scipy_radau(freq: float, duration: float) -> np.ndarray:
     """Run SciPy's stiff integrator on the same grid, for a sine whose derivative it is told."""
     A, mean = operators()
     w = 2 * np.pi * freq
-    t = np.arange(round(duration * FS)) / FS
+    t = np.arange(round(duration * BASE_RATE_HZ)) / BASE_RATE_HZ
     solution = solve_ivp(
         lambda at, u: A @ u - w * np.cos(w * at),
         (0.0, t[-1]),
@@ -86,11 +86,11 @@ def scipy_radau(freq: float, duration: float) -> np.ndarray:
 
 def speed() -> None:
     _, wall = sine(10.0, 60.0)
-    CHANNEL.simulate(wall[:10], FS)
-    ours = 60.0 / best_of(5, lambda: CHANNEL.simulate(wall, FS))
+    CHANNEL.simulate(wall[:10], BASE_RATE_HZ)
+    ours = 60.0 / best_of(5, lambda: CHANNEL.simulate(wall, BASE_RATE_HZ))
     print(f"60 s at 20 kHz, {CHANNEL.nodes} intervals: {ours:.0f} times real time (promised: 400)")
     _, short = sine(10.0, 1.0)
-    expected = CHANNEL.simulate(short, FS)
+    expected = CHANNEL.simulate(short, BASE_RATE_HZ)
     peers: dict[str, Callable[[], np.ndarray]] = {
         "NumPy recursion, same modes": lambda: numpy_recursion(short),
         "scipy.signal.lsim, same grid": lambda: scipy_lsim(short),
@@ -112,7 +112,7 @@ def accuracy() -> None:
         print(f"discretised response below 1 kHz, {nodes:3d} intervals: {error:.1e} (promised at 160: 1e-6)")
     for line, promised in ((10.0, 1e-6), (1000.0, 1e-4)):
         t, wall = sine(line, 4.0)
-        got = CHANNEL.simulate(wall, FS)[-20000:]
+        got = CHANNEL.simulate(wall, BASE_RATE_HZ)[-20000:]
         expected = np.imag(CHANNEL.response(line) * np.exp(2j * np.pi * line * t[-20000:]))
         print(f"sine in time, {line:.0f} Hz: {np.max(np.abs(got - expected)):.1e} (promised: {promised:.0e})")
 

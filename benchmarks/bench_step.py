@@ -18,21 +18,22 @@ import numpy as np
 
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable import stepping
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.scenario.loader import load_scenario
 from testbed.scenario.step_choice import choose_step
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
-FS = 20000.0
 N_TIME = 8000
 PLANT = TurntableParameters(rotor_com=(1e-4, 0.0, 0.05))
 
 
 def play(freq_hz: float, holds: int = 1, substeps: int = 1) -> tuple[FloatArray, float]:
     """Return the true rate [rad/s] of 1 deg/s at one frequency, and its CPU time [s]."""
-    motion = MotionProfile([lambda t: np.deg2rad(1.0) * np.sin(2 * np.pi * freq_hz * t)], 0.05, FS)
+    motion = MotionProfile([lambda t: np.deg2rad(1.0) * np.sin(2 * np.pi * freq_hz * t)], 0.05, BASE_RATE_HZ)
     table = Turntable(PLANT, {"mhd_ars": Mounting()}, holds=holds, substeps=substeps)
     command = motion.process(N_TIME)
     begin = time.process_time()

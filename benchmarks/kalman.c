@@ -1,4 +1,4 @@
-/* The Kalman filter of testbed/fusion/kernels.py, same arithmetic and same outputs, for fixed sizes (-DN=5 -DS=2). */
+/* The Kalman filter of testbed/fusion/kernels/covariance.py, same arithmetic and same outputs, for fixed sizes (-DN=5 -DS=2). */
 #include <math.h>
 #include <string.h>
 

@@ -21,12 +21,12 @@ from scipy.optimize import minimize, minimize_scalar
 
 from testbed.fusion import estimate
 from testbed.fusion.bands import load_bands
-from testbed.reproduce.paper1 import SIGNALS, Protocol, truth
+from testbed.reproduce.paper1 import SIGNALS, FusionProtocol, truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-PROTOCOL = Protocol()
+PROTOCOL = FusionProtocol()
 TUNING_SEEDS = range(101, 106)
 BEYOND = ("25 Hz", "100 Hz", "0.5 Hz, 5 deg/s", "4 Hz, 10 deg/s", "jump")
 SHAKF_Q, ARW_Q, LITERAL_Q = (f"{q} (deg/s)^2/s" for q in ("0.0056", "0.1", "0.3"))

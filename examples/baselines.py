@@ -21,8 +21,8 @@ from testbed.parts import resolve
 from testbed.reproduce.paper1 import SIGNALS
 from testbed.sensors import load_preset
 from testbed.signals import random_stream
+from testbed.units import DEG
 
-DEG = np.pi / 180.0
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
 SENSORS = {"mhd_ars": load_preset("sx300"), "mems_gyro": load_preset("adis16505_filtered")}
 BELIEF = load_belief("identified")
@@ -74,7 +74,7 @@ def main() -> None:
         best, coloured = (signal_optimum(SENSORS, RATES, lines, coloured=coloured) for coloured in (False, True))
         print(
             f"{signal:>8}{'optimum':>22}{best.rmse / DEG:10.5f}{'':>21}   {coloured.rmse / DEG:.5f} once 1/f noise "
-            f"has built up"
+            "has built up"
         )
         runs = [errors(signal, seed) for seed in seeds]
         for name in runs[0]:

@@ -19,10 +19,10 @@ import numpy as np
 
 from testbed.fusion.bands import calibrate_bands, increment_variance
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
 
 SWEEP_HZ = np.array([0.1, 0.2, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 3.3, 5.0, 6.3, 8.0, 12.0, 17.0, 25.0])
 PRESETS = {"mems_gyro": "adis16505_filtered", "mhd_ars": "sx300"}
-BASE_HZ = 20_000.0
 SETTLE_S = 2.0
 SEED = 7
 EDGES_HZ = (2.0, 6.3)
@@ -45,11 +45,11 @@ def sweep(seed: int = SEED) -> dict[str, np.ndarray]:
     for i, freq in enumerate(SWEEP_HZ):
         # Whole periods, as an increment depends on the phase.
         measure = np.ceil(2.0 * freq) / freq
-        t = np.arange(round((SETTLE_S + measure) * BASE_HZ)) / BASE_HZ
+        t = np.arange(round((SETTLE_S + measure) * BASE_RATE_HZ)) / BASE_RATE_HZ
         rate = np.deg2rad(1.0) * np.sin(2 * np.pi * freq * t)
         for name, preset in PRESETS.items():
             sensor = load_preset(preset)
-            readings = sensor.sample(rate, BASE_HZ, seed + i)
+            readings = sensor.sample(rate, BASE_RATE_HZ, seed + i)
             levels[name][i] = increment_variance(readings[round(SETTLE_S * sensor.sample_rate) :])
     return levels
 
@@ -62,7 +62,8 @@ def thresholds(levels: dict[str, np.ndarray]) -> dict[str, tuple[float, float]]:
 def bands_file(levels: dict[str, np.ndarray]) -> str:
     """Return the text of the file of bands: two digits, as the scatter of N_k allows."""
     lines = [
-        "# Written by examples/calibrate_bands.py: N_k / dT at the band edges of a stepped sine of 1 deg/s,",
+        f"# N_k / dT of {' and '.join(PRESETS.values())} at the band edges of a stepped sine of 1 deg/s.",
+        "# Written by examples/calibrate_bands.py:",
         (
             f"# {SWEEP_HZ[0]:g}-{SWEEP_HZ[-1]:g} Hz in {SWEEP_HZ.size} steps, edges {EDGES_HZ[0]:g} and "
             f"{EDGES_HZ[1]:g} Hz, noise on, seed {SEED}. N_k sees amplitude times frequency:"

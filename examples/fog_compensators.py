@@ -20,20 +20,20 @@ import numpy as np
 
 from testbed.allan import allan_deviation, fit_allan
 from testbed.compensation.features import Features
-from testbed.compensation.lssvm import Lssvm, block_residuals
+from testbed.compensation.lssvm import Lssvm, kernel_residuals
 from testbed.compensation.model_only import DriftModel, train
 from testbed.compensation.record import Record
 from testbed.compensation.search import evolve, grey_wolf
 from testbed.compensation.training import block_means, gather
-from testbed.drift.leak import audit
+from testbed.drift.leak import find_leaks
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
 from testbed.sensors.base import Surroundings
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from testbed.sensors.fog import Fog
 
-DEG_H = np.pi / 180.0 / 3600.0
 EARTH = 10.6 * DEG_H
 FOG = load_preset("fog_paper3").model_copy(update={"sample_rate": 1.0})
 # Holds [s] and ramps (to degC, K/min) from 20 degC.
@@ -186,7 +186,7 @@ def audited(model: DriftModel, seed: int) -> None:
     def compensate(record: Record) -> np.ndarray:
         return model.apply(record).rate
 
-    found = audit(compensate, unseen.record, compensate(unseen.record), unseen.drift)
+    found = find_leaks(compensate, unseen.record, compensate(unseen.record), unseen.drift)
     print(f"{model.method}, audit: {'; '.join(found.leaks) or 'no leak found'}")
 
 
@@ -213,7 +213,7 @@ def searches(seed: int) -> None:
     bounds = ((10.0, 1e5), (1e-6, 1e6))
 
     def blocked(p: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(block_residuals(rows.Z, rows.y, p[0], p[1], rows.folds) ** 2)) / DEG_H)
+        return float(np.sqrt(np.mean(kernel_residuals(rows.Z, rows.y, p[0], p[1], rows.folds) ** 2)) / DEG_H)
 
     def training(p: np.ndarray) -> float:
         return float(np.sqrt(np.mean((Lssvm.fit(rows.Z, rows.y, p[0], p[1]).weights / p[0]) ** 2)) / DEG_H)

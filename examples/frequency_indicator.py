@@ -16,14 +16,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from testbed.fusion.analysis.indicator import FrequencyIndicator
+from testbed.fusion.bands import increment_variance
 from testbed.fusion.belief import load_belief
-from testbed.fusion.filters.arw_shakf import increment_variance
 from testbed.sensors import load_preset
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DEG = np.pi / 180.0
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
 SENSORS = {"mhd_ars": load_preset("sx300"), "mems_gyro": load_preset("adis16505_filtered")}
 BELIEF = load_belief("identified")

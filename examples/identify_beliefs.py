@@ -43,12 +43,13 @@ def identified() -> dict[str, Identified]:
 def belief_file() -> str:
     """Return the text of the belief file."""
     lines = [
-        "# Written by examples/identify_beliefs.py from the responses of the presets; s in rad/s, highest power first."
+        f"# What fits the responses of the presets {' and '.join(preset for preset, _ in SENSORS.values())}.",
+        "# Written by examples/identify_beliefs.py; s in rad/s, highest power first.",
     ]
     for name, fit in identified().items():
         lines.append(
-            f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to "
-            f"{FREQ_HZ[-1]:g} Hz"
+            f"{name}:  # {SENSORS[name][0]}, "
+            f"misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to {FREQ_HZ[-1]:g} Hz"
         )
         # Nine digits: far below the misfit.
         lines += [

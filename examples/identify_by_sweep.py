@@ -16,8 +16,8 @@ import numpy as np
 
 from testbed.fusion.analysis.identify import Identified, identify, sine_response
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
 
-BASE_HZ = 20_000.0
 AMPLITUDE = np.deg2rad(1.0)
 SEED = 11
 FREQ_HZ = np.array(
@@ -75,12 +75,12 @@ def sweep(seed: int = SEED) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     found: dict[str, list[tuple[float, complex]]] = {name: [] for name in SENSORS}
     for i, freq in enumerate(FREQ_HZ):
         settle = SETTLE_SLOW_S if freq < SLOW_HZ else SETTLE_S
-        t = np.arange(round((settle + measured_s(freq)) * BASE_HZ)) / BASE_HZ
+        t = np.arange(round((settle + measured_s(freq)) * BASE_RATE_HZ)) / BASE_RATE_HZ
         rate = AMPLITUDE * np.sin(2.0 * np.pi * freq * t)
         for name, (preset, _) in SENSORS.items():
             sensor = load_preset(preset)
             if freq < sensor.sample_rate / 2.0:
-                readings = sensor.sample(rate, BASE_HZ, 1000 * seed + i)
+                readings = sensor.sample(rate, BASE_RATE_HZ, 1000 * seed + i)
                 found[name].append((freq, sine_response(readings, sensor.sample_rate, freq, AMPLITUDE, settle=settle)))
     return {name: (np.array([f for f, _ in rows]), np.array([G for _, G in rows])) for name, rows in found.items()}
 
@@ -93,10 +93,8 @@ def identified(seed: int = SEED) -> dict[str, Identified]:
 def belief_file(seed: int = SEED) -> str:
     """Return the text of the belief file."""
     lines = [
-        (
-            "# Written by examples/identify_by_sweep.py from a stepped sine of 1 deg/s with noise on; equation (39)'s "
-            "forms, s in rad/s, highest first."
-        )
+        "# Equation (39)'s forms, identified from a stepped sine of 1 deg/s with noise on.",
+        "# Written by examples/identify_by_sweep.py; s in rad/s, highest power first.",
     ]
     for name, fit in identified(seed).items():
         lines.append(

@@ -17,11 +17,11 @@ from testbed.compensation.ceemdan import ceemdan
 from testbed.compensation.entropy import multiscale_sample_entropy, permutation_entropy
 from testbed.compensation.grouping import group_modes, mean_period
 from testbed.sensors.noise import GyroNoise
+from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
-DEG_PER_HOUR = np.pi / 180.0 / 3600.0
 SEEDS = range(6)
 METHODS = ("period", "sample_entropy", "permutation_entropy")
 
@@ -30,16 +30,14 @@ def record(n_time: int = 85_200) -> FloatArray:
     """Return noise of 7.8e-4 deg/sqrt(h) and 1.5e-2 deg/h with the drift of a cycle 20, 60, -30 C with a lag of 25 min
     [rad/s].
     """
-    noise = GyroNoise(angle_random_walk=7.8e-4 * 60.0 * DEG_PER_HOUR, bias_instability=1.5e-2 * DEG_PER_HOUR).sample(
-        n_time, 1.0, 1
-    )
+    noise = GyroNoise(angle_random_walk=7.8e-4 * 60.0 * DEG_H, bias_instability=1.5e-2 * DEG_H).sample(n_time, 1.0, 1)
     chamber = np.interp(np.arange(n_time), [0, 7200, 31_200, 85_200], [20.0, 20.0, 60.0, -30.0])
     coil = np.empty(n_time)
     coil[0] = 20.0
     for k in range(1, n_time):
         coil[k] = coil[k - 1] + (chamber[k - 1] - coil[k - 1]) / 1500.0
     drift = 0.1 * ((coil - 20.0) / 40.0) ** 2 + 0.45 * 60.0 * np.gradient(coil)
-    value: FloatArray = noise + drift * DEG_PER_HOUR
+    value: FloatArray = noise + drift * DEG_H
     return value
 
 
@@ -55,15 +53,15 @@ def main(trials: int = 20) -> None:
     runs = [ceemdan(signal, trials=trials, seed=seed) for seed in SEEDS]
     print("mode  period, s  rms, deg/h  permutation entropy  sample entropy at scale 55   (seed 0)")
     for k, mode in enumerate(runs[0][:-1], 1):
-        numbers = np.std(mode) / DEG_PER_HOUR, permutation_entropy(mode), multiscale_sample_entropy(mode, [55])[0]
+        numbers = np.std(mode) / DEG_H, permutation_entropy(mode), multiscale_sample_entropy(mode, [55])[0]
         print("{:4d} {:10.4g} {:11.4f} {:20.3f} {:27.3f}".format(k, mean_period(mode, 1.0), *numbers))
     print(f"modes by seed: {[len(modes) - 1 for modes in runs]}")
     for method in METHODS:
         groups = [group_modes(modes, 1.0, method=method) for modes in runs]
         print(
             (
-                f"{method}: noise ends at {[g.noise.stop for g in groups]}, mixed at {[g.mixed.stop for g in groups]}; "
-                f"moves by"
+                f"{method}: noise ends at {[g.noise.stop for g in groups]}, "
+                f"mixed at {[g.mixed.stop for g in groups]}; moves by"
             ),
             end="",
         )

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.reproduce.paper2 import CHANNELS, Protocol, linearity
+from testbed.reproduce.paper2 import CHANNELS, BenchProtocol, linearity
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
-PAPER = Protocol(linear_frequencies=(2.0,))
+PAPER = BenchProtocol(linear_frequencies=(2.0,))
 WAYS = {
     "just switched on": replace(PAPER, warm_up=0.0),
     "one second, no window": replace(PAPER, linear_observe=1.0),
@@ -28,7 +28,7 @@ WAYS = {
 }
 
 
-def ratios(seeds: int, protocol: Protocol) -> FloatArray:
+def ratios(seeds: int, protocol: BenchProtocol) -> FloatArray:
     """Return the largest deviation of the fused rate over that of the MHD ARS, shape (n_seed,) [-]."""
     found = np.array([linearity(seed, protocol)[0] for seed in range(1, seeds + 1)])
     return found[:, CHANNELS.index("fused")] / found[:, CHANNELS.index("mhd_ars")]
@@ -44,8 +44,8 @@ def main() -> None:
         found = ratios(seeds, protocol)
         error = np.std(found, ddof=min(1, seeds - 1)) / np.sqrt(seeds)
         print(
-            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, below 1 in "
-            f"{np.sum(found < 1.0)}"
+            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, "
+            f"below 1 in {np.sum(found < 1.0)}"
         )
 
 

@@ -22,13 +22,13 @@ from testbed.fusion import estimate
 from testbed.fusion.analysis.runaway import critical_q
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from matplotlib.axes import Axes
 
-DEG = np.pi / 180.0
 PRESETS = {"mems_gyro": "adis16505_filtered", "mhd_ars": "sx300"}
 RATES = {"mems_gyro": 2_000.0, "mhd_ars": 20_000.0}
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "runaway_edge.png"
@@ -149,8 +149,8 @@ def main() -> None:
     draw(edges).savefig(PICTURE)
     ratios = [e.ratio for e in edges]
     print(
-        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; drawn in "
-        f"{PICTURE.name}"
+        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; "
+        f"drawn in {PICTURE.name}"
     )
 
 

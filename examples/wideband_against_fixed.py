@@ -29,6 +29,7 @@ from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.models.motions.sine import Sine
 from testbed.sensors import load_preset
 from testbed.signals import random_stream
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.signals import FloatArray
 
-DEG = np.pi / 180.0
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
 SENSORS = {"mhd_ars": load_preset("sx300"), "mems_gyro": load_preset("adis16505_filtered")}
 BELIEF = load_belief("identified")
@@ -141,8 +141,8 @@ def against_fixed(
 ) -> None:
     """Print a line per signal, and write them to a file."""
     print(
-        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, "
-        f"{duration:g} s"
+        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, "
+        f"{len(seeds)} seeds, {duration:g} s"
     )
     rows = []
     for label in labels:
@@ -249,8 +249,8 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
 def under_change(seeds: Sequence[int], own: dict[str, float]) -> None:
     """Print what a change in the middle of the run costs: promised are at most 1.3 times the error without it."""
     print(
-        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after "
-        f"the change on"
+        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, "
+        f"from {AFTER:g} s after the change on"
     )
     for label in CHANGES:
         real, ideal, peak = np.array([change_errors(label, seed, **own) for seed in seeds]).T

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from testbed.errors import Problem, ScenarioError, quoted, shortened
-from testbed.inputs.tree import read_yaml
+from testbed.inputs.tree import Tree, read_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
+    from collections.abc import Iterable, Iterator, Mapping
 
     Key = tuple[str | int, ...]
 
@@ -22,14 +22,16 @@ _MOST_FINDINGS = 100
 
 
 class Document:
-    """The content of a YAML file and what was found wrong with it.
+    """The content of a YAML file, or of a mapping built in Python, and what was found wrong with it.
 
     Parameters
     ----------
-    path : Path
-        The file.
+    path : Path or str
+        The file; of a mapping, the one that it came from, or nothing.
     what : str
         What it should hold, with its first keys, for the message about an empty or wrong one.
+    tree : Tree, optional
+        The content, if it is not to be read.
 
     Raises
     ------
@@ -38,10 +40,12 @@ class Document:
         `testbed.inputs`.
     """
 
-    def __init__(self, path: Path, what: str = "scenario (name, duration, motion, sensors, ...)") -> None:
+    def __init__(
+        self, path: Path | str, what: str = "scenario (name, duration, motion, sensors, ...)", tree: Tree | None = None
+    ) -> None:
         self.file, self._what = str(path), what
         self.problems: list[Problem] = []
-        self._tree = read_yaml(path, f"a {what.split(maxsplit=1)[0]}")
+        self._tree = read_yaml(Path(path), f"a {what.split(maxsplit=1)[0]}") if tree is None else tree
         self.data = self._mapping(self._tree.data)
 
     def find(self, key: Key, message: str) -> None:
@@ -62,13 +66,13 @@ class Document:
         if found:
             raise ScenarioError(found)
 
-    def validate(self, model: type[Model], data: Any, key: Key, folder: Path) -> Model | None:
+    def validate(self, model: type[Model], data: Any, key: Key, folder: Path, **context: Any) -> Model | None:
         """Validate `data`, found at `key`, as `model`; note what is wrong and return None then."""
         try:
-            return model.model_validate(data, context={"border": True, "folder": folder})
+            return model.model_validate(data, context={"border": True, "folder": folder, **context})
         except ValidationError as error:
-            for detail in error.errors():
-                self.find((*key, *_visible(detail["loc"], data)), _message(detail, model))
+            for place, message in findings(error, model, data):
+                self.find((*key, *place), message)
         except ScenarioError as error:
             self.adopt(error)
         return None
@@ -82,6 +86,22 @@ class Document:
 
     def _fatal(self, message: str, *, line: int | None = None) -> NoReturn:
         raise ScenarioError([Problem(message, file=self.file, line=line)])
+
+
+def findings(error: ValidationError, model: type[BaseModel], data: Any) -> Iterator[tuple[Key, str]]:
+    """Yield place and message of everything that is wrong with `data` as `model`.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What was found.
+    model : type
+        What was expected.
+    data : Any
+        What was given.
+    """
+    for detail in error.errors():
+        yield _visible(detail["loc"], data), _message(detail, model)
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:

@@ -52,7 +52,16 @@ class Problem:
 
 
 class ScenarioError(ValueError):
-    """The input is bad; `problems` lists every finding with file, line, key and expectation."""
+    """The input is bad; `problems` lists every finding with file, line, key and expectation.
+
+    Examples
+    --------
+    >>> error = ScenarioError([Problem("is required", "duration", "mine.yaml", 3)])
+    >>> print(error)
+    mine.yaml:3: duration: is required
+    >>> error.problems[0].key
+    'duration'
+    """
 
     def __init__(self, problems: Iterable[Problem] | str) -> None:
         self.problems = [Problem(problems)] if isinstance(problems, str) else list(problems)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import functools
 import importlib
 from importlib import resources
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-from testbed.errors import UnknownNameError
+from testbed.document import findings
+from testbed.errors import Problem, ScenarioError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from testbed.inputs.plugins import Plugins
 
 
 class Part(BaseModel):
@@ -20,28 +23,60 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, validated as the constructor does.
 
-def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:
+        Parameters
+        ----------
+        update : mapping, optional
+            New values by name: SI floats, or strings with units.
+        deep : bool, optional
+            Copy nested parts too, where there is no update.
+
+        Raises
+        ------
+        ScenarioError
+            If a name is unknown or a value is wrong; all at once.
+        """
+        if not update:
+            return super().model_copy(deep=deep)
+        values = {name: getattr(self, name) for name in self.model_fields_set} | dict(update)
+        try:
+            return type(self).model_validate(values)
+        except ValidationError as error:
+            problems = [
+                Problem(message, ".".join(map(str, place))) for place, message in findings(error, type(self), values)
+            ]
+            raise ScenarioError(problems) from error
+
+
+def resolve(kind: str, name: str, registry: Mapping[str, str], plugins: Plugins | None = None) -> type[Any]:
     """Import the class that `registry` (name -> ``package.module:Class``) knows as `name`.
 
-    A `name` that contains a colon is a user's own ``package.module:Class``.
+    Parameters
+    ----------
+    kind : str
+        What it is, for messages and entry points.
+    name : str
+        Name of the registry or, given `plugins`, of an installed package's entry point, or ``module:Class``.
+    registry : mapping of str to str
+        The shipped ones.
+    plugins : Plugins, optional
+        Those that may be asked; a scenario's name alone loads no code.
 
     Raises
     ------
     UnknownNameError
-        If the name, the module or the class does not exist.
+        If there is no such class.
     """
-    target = name if ":" in name else registry.get(name)
-    if target is None:
+    if plugins is not None:
+        part = plugins.part(kind, name, registry) if ":" in name else plugins.installed(kind, name, registry)
+        if part is not None:
+            return part
+    if name not in registry:
         raise UnknownNameError(kind, name, registry)
-    module, _, attribute = target.partition(":")
-    try:
-        return cast("type[Any]", getattr(importlib.import_module(module), attribute))
-    except Exception as error:
-        # A user's own module may fail in any way; one of ours that does is our fault and keeps its traceback.
-        if ":" not in name:
-            raise
-        raise UnknownNameError(kind, name, registry, reason=f"{type(error).__name__}: {error}") from error
+    module, _, attribute = registry[name].partition(":")
+    return cast("type[Any]", getattr(importlib.import_module(module), attribute))
 
 
 def preset_names(package: str) -> list[str]:

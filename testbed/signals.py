@@ -14,6 +14,8 @@ ComplexArray = NDArray[np.complex128]
 
 # Base clock of a run, unless all its sensors are content with less.
 BASE_RATE_HZ = 20_000.0
+# Samples worked on at a time: a second of the base clock.
+BLOCK = 20_000
 
 
 def sample_times(start: int, n_time: int, sample_rate_hz: float) -> FloatArray:

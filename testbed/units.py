@@ -28,7 +28,8 @@ from testbed.errors import quoted
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
-DEG_H = math.radians(1.0) / 3600.0  # rad/s
+DEG = math.radians(1.0)  # rad
+DEG_H = DEG / 3600.0  # rad/s
 CELSIUS = 273.15  # K, 0 degC
 
 _DEFINITIONS = """
@@ -161,6 +162,14 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
     ------
     ValueError
         If the number, the unit or the dimension is wrong; NaN and infinity are refused.
+
+    Examples
+    --------
+    >>> parse("20 kHz", "Hz")
+    20000.0
+    >>> parse("10 rad/s", "Hz")
+    Traceback (most recent call last):
+    ValueError: expected a quantity in Hz, got '10 rad/s': 'rad/s' has the wrong dimension
     """
     expected = _expectation(si, example)
     if len(text) > _MOST_TEXT:
@@ -279,7 +288,9 @@ class Quantity:
         return {"type": "string", "description": f"quantity in {self.unit}", "examples": [self.example]}
 
     def _write(self, value: float, info: Any) -> str | float:
-        return f"{value!r} {self.unit}" if self.unit and (info.context or {}).get("border") else value
+        # A default of NumPy's own float would be written with its type's name.
+        si = float(value)
+        return f"{si!r} {self.unit}" if self.unit and (info.context or {}).get("border") else si
 
 
 Angle = Annotated[float, Quantity("rad", "5 mrad")]

@@ -125,6 +125,14 @@ def fit_allan(curve: AllanCurve) -> AllanFit:
     ------
     ValueError
         If there are fewer than 5 averaging times, or the record is constant or a ramp without noise.
+
+    Examples
+    --------
+    >>> from testbed.allan import allan_deviation
+    >>> white = np.random.default_rng(1).standard_normal(10_000)
+    >>> found = fit_allan(allan_deviation(white, 1.0)).angle_random_walk
+    >>> bool(found.lower < 1.0 < found.upper)
+    True
     """
     problem = _Problem(curve)
     squares = problem.solve()
@@ -194,11 +202,12 @@ class _Problem:
     def __init__(self, curve: AllanCurve) -> None:
         if curve.tau.size < len(_TERMS) or not np.all(curve.deviation > 0.0):
             msg = (
-                f"curve: expected at least {len(_TERMS)} averaging times and deviations above zero, got "
-                f"{curve.deviation}"
+                f"curve: expected at least {len(_TERMS)} averaging times and deviations above zero, "
+                f"got {curve.deviation}"
             )
             raise ValueError(msg)
         self._tau, self._n_time = curve.tau, curve.n_time
+        self._used = 1.0 if curve.used is None else curve.used
         self._m = np.round(curve.tau * curve.sample_rate_hz)
         self._measured = curve.deviation**2
         self._columns = _columns(self._tau, self._m)
@@ -261,7 +270,7 @@ class _Problem:
         """Return the standard deviations of the Allan variances if `model` is their expectation."""
         alphas = curve_exponents(self._m, model)
         pairs = zip(self._m, alphas, strict=True)
-        edf = np.array([equivalent_freedom(int(m), self._n_time + 1, int(a)) for m, a in pairs])
+        edf = self._used * np.array([equivalent_freedom(int(m), self._n_time + 1, int(a)) for m, a in pairs])
         spread: FloatArray = model * np.sqrt(2.0 / edf)
         return spread
 

@@ -22,9 +22,11 @@ class AllanCurve:
     edf : ndarray, shape (n_tau,)
         Equivalent degrees of freedom [-].
     n_time : int
-        Number of samples of the record.
+        Number of samples of the record, lost ones counted.
     sample_rate_hz : float
         Its sample rate [Hz].
+    used : ndarray, shape (n_tau,), optional
+        Share of the second differences that lost samples left [-]; None: all.
     """
 
     tau: FloatArray
@@ -34,9 +36,10 @@ class AllanCurve:
     edf: FloatArray
     n_time: int
     sample_rate_hz: float
+    used: FloatArray | None = None
 
     def between(self, low: float, high: float) -> AllanCurve:
         """Return the part of the curve with `low` <= tau <= `high` [s]."""
         chosen = (self.tau >= low) & (self.tau <= high)
         parts = {name: getattr(self, name)[chosen] for name in ("tau", "deviation", "lower", "upper", "edf")}
-        return replace(self, **parts)
+        return replace(self, used=None if self.used is None else self.used[chosen], **parts)

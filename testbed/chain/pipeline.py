@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.errors import RunError
+from testbed.fusion import FILTERS
+from testbed.fusion.checked import CheckedFilter
+from testbed.inputs.plugins import PluginError
 from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
-from testbed.scenario.step_choice import choose_step
+from testbed.scenario.step_choice import choose_step, exposed
+from testbed.sensors import SENSORS
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
-from testbed.signals import random_stream
+from testbed.sensors.checked import CheckedSensor
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from testbed.fusion import EstimateBlock
     from testbed.models.turntable.turntable import TruthBlock
-    from testbed.scenario.model import Scenario
+    from testbed.scenario.model import FilterSpec, Scenario
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
 POSE_STRIDE = 400
-# Samples: a second at 20 kHz.
-_BLOCK = 20_000
 
 
 class Chain:
@@ -40,7 +41,6 @@ class Chain:
     def __init__(self, scenario: Scenario) -> None:
         self._motion, base = scenario.profile(), scenario.base_rate_hz
         mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
-        seed, duration = scenario.frame.seed, scenario.frame.duration
         self.step = choose_step(scenario)
         self.turntable = Turntable(
             scenario.turntable,
@@ -49,19 +49,29 @@ class Chain:
             substeps=self.step.substeps,
             holds=self.step.holds,
             pose_stride=POSE_STRIDE,
-            exposed=[name for name, sensor in scenario.sensors.items() if sensor.exposed],
-            floor=scenario.turntable.floor.start(duration, partial(random_stream, seed, "turntable", "floor")),
+            exposed=exposed(scenario),
+            modal=self.step.modal,
+            floor=scenario.floor(),
         )
         self._temperature = scenario.frame.temperature
-        self._sensors = {name: sensor.start(base, seed, name) for name, sensor in scenario.sensors.items()}
+        self._sensors = {
+            name: sensor.start(base, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
+        }
+        self._foreign = {
+            name: CheckedSensor(name, round(base / sensor.sample_rate))
+            for name, sensor in scenario.sensors.items()
+            if scenario.sensor_types[name] not in SENSORS
+        }
         rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
+        fastest = max(rates.values(), default=base)
         self._fusion = {
-            name: spec.factory(spec.belief, rates, spec.parameters) for name, spec in scenario.fusion.items()
+            name: CheckedFilter(name, _started(name, spec, rates), fastest, shipped=spec.type in FILTERS)
+            for name, spec in scenario.fusion.items()
         }
         self.rates = {
             "base": base,
             **rates,
-            **dict.fromkeys(self._fusion, max(rates.values(), default=base)),
+            **dict.fromkeys(self._fusion, fastest),
         }
 
     def process(self, n_time: int) -> RunBlock:
@@ -69,11 +79,11 @@ class Chain:
         command = self._motion.process(n_time)
         truth = self.turntable.process(command, self._motion.peek(self.turntable.lookahead))
         readings, profiles = {}, {}
-        for name, stage in self._sensors.items():
-            readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start, self._around(name, truth))
+        for name in self._sensors:
+            readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: self._estimate(name, readings) for name in self._fusion}
+        estimates = {name: stage.process(readings) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         return RunBlock(
             command.start,
@@ -86,19 +96,27 @@ class Chain:
             drifts={name: stage.drift for name, stage in thermal.items()},
         )
 
-    def _estimate(self, name: str, readings: Mapping[str, FloatArray]) -> EstimateBlock:
-        """Return the estimate of a filter, which may be a user's own: one value per reading of the fastest sensor."""
-        estimate: EstimateBlock = self._fusion[name].process(readings)
-        n_time = max(values.size for values in readings.values())
-        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
-            if np.shape(values) != (n_time,):
-                msg = f"filter {name}: expected {signal} of shape ({n_time},), got {np.shape(values)}"
-                raise RunError(msg)
-        return estimate
+    def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
+        """Return the readings of a block, and the velocity profiles of a sensor that has them."""
+        stage, around = self._sensors[name], self._around(name, truth)
+
+        def feed(rate: FloatArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
+            return _sense(stage, rate, truth.start, around)
+
+        rate = truth.sensor_rate[name]
+        return self._foreign[name].sense(feed, rate) if name in self._foreign else feed(rate)
 
     def _around(self, name: str, truth: TruthBlock) -> Surroundings:
         temperature = self._temperature.at(truth.start, truth.rate.size, self.rates["base"])
         return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
+
+
+def _started(name: str, spec: FilterSpec, rates: Mapping[str, float]) -> Any:
+    try:
+        return spec.start(rates)
+    except PluginError as error:
+        msg = f"filter {name}: {error}"
+        raise RunError(msg) from error
 
 
 def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Iterator[RunBlock]]:
@@ -112,7 +130,7 @@ def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Ite
         Length of a block [s], 20 000 samples of the base clock if not given; the result does not depend on it.
     """
     chain = Chain(scenario)
-    step = _BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
+    step = BLOCK if block is None else max(round(block * scenario.base_rate_hz), 1)
     return chain, (chain.process(min(step, scenario.n_time - start)) for start in range(0, scenario.n_time, step))
 
 

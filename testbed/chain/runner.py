@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from contextlib import ExitStack
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from testbed._version import __version__
 from testbed.chain.interrupt import held_interrupts
 from testbed.chain.pipeline import simulate
 from testbed.judging.judge import Judge
-from testbed.runs.folder import RunFolder, failing_as_run_error, open_run, write_metrics, write_scenario
+from testbed.notebook import Run, open_run
+from testbed.runs.attributes import provenance
+from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.netcdf import NetcdfStore
-from testbed.runs.results import MemoryStore, Run, assemble
+from testbed.runs.results import MemoryStore
+from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from testbed.scenario.model import Scenario
 
@@ -27,10 +31,10 @@ _LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "rerun-sdk")
 
 
 def run(
-    scenario: Scenario,
-    *,
-    out: str | Path | None = None,
+    scenario: Scenario | str | Path | Mapping[str, Any],
     seed: int | None = None,
+    out: str | Path | None = None,
+    *,
     block: float | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -38,13 +42,13 @@ def run(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `load_scenario`.
+    scenario : Scenario, str, Path or mapping
+        A scenario, its file, or its keys as `Scenario.from_dict` takes them.
+    seed : int, optional
+        Instead of the scenario's.
     out : str or Path, optional
         Run folder to write; then the signals are read from it when they are asked for. Without it they are kept in
         memory.
-    seed : int, optional
-        Instead of the scenario's.
     block : float, optional
         Length of a block [s], 20 000 samples of the base clock if not given; the signals do not depend on it.
     progress : callable, optional
@@ -60,15 +64,22 @@ def run(
     RunError
         If the plant diverges, the motor saturates or the disk is full; says how far it got.
     ScenarioError
-        If `out` cannot be written or holds something else.
+        If the scenario is bad, or `out` cannot be written or holds something else.
+
+    Examples
+    --------
+    >>> still = {"name": "still", "duration": "0.1 s", "motion": [{"static": {}}], "turntable": {"mode": "fixed"}}
+    >>> run(still, seed=3)
+    <Run still, 0.1 s, seed 3>
     """
-    if block is not None and not block > 0.0:
-        msg = f"block: expected more than 0 s, got {block!r}"
+    if block is not None and not 0.0 < block < math.inf:
+        msg = f"block: expected more than 0 s, and finite, got {block!r}"
         raise ValueError(msg)
-    scenario = scenario if seed is None else scenario.with_seed(seed)
+    loaded = as_scenario(scenario)
+    loaded = loaded if seed is None else loaded.with_seed(seed)
     if out is None:
-        return _run_in_memory(scenario, block, progress)
-    return _run_to_folder(scenario, Path(out), block, progress)
+        return _run_in_memory(loaded, block, progress)
+    return _run_to_folder(loaded, Path(out), block, progress)
 
 
 def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress | None) -> Run:
@@ -79,7 +90,7 @@ def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress |
         judge.write(part)
         if progress is not None:
             progress((part.start + part.n_time) / chain.rates["base"])
-    return assemble(memory.groups(), {**judge.metrics(), "versions": versions()})
+    return Run.of(memory.groups(), judge.metrics(versions()))
 
 
 def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress: Progress | None) -> Run:
@@ -94,11 +105,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         scenario = scenario.kept_in(folder.path)
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain.rates, chain.step)
-        attributes = {
-            "scenario": scenario.name,
-            "seed": scenario.frame.seed,
-            **{f"{k}_version": v for k, v in versions().items()},
-        }
+        attributes = provenance(scenario.name, scenario.frame.seed, versions())
         netcdf = NetcdfStore(folder.path / "run.nc", chain.rates, scenario.frame.duration, attributes)
         stack.callback(netcdf.close)
         recording = stack.enter_context(
@@ -123,11 +130,12 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
             check_interrupt()
         netcdf.close()
         recording.close()
-        write_metrics(folder.path, {**judge.metrics(), "versions": versions()})
+        metrics = judge.metrics(versions())
+        write_metrics(folder.path, metrics.to_dict())
         write_scenario(folder.path, scenario.resolved(folder.path), versions())
         write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish({"versions": versions()}))
+        return open_run(folder.finish({"versions": versions(), "plugins": metrics.plugins}))
 
 
 def versions() -> dict[str, str]:

@@ -4,37 +4,68 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
+from testbed.inputs.plugins import Plugins, load_plugins, offered
+from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.parts import resolve
 from testbed.reproduce import PAPERS
 from testbed.sensors import SENSORS
+from testbed.sensors.base import Sensor
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 
-def catalogue() -> dict[str, dict[str, str]]:
-    """Return every name with one line, by kind."""
-    table = {
-        kind: {
-            name: _first_line(resolve(kind, name, registry))
-            for name, registry in ((name, registry) for name in registry)
-        }
-        for kind, registry in (("motion", MOTIONS), ("sensor", SENSORS), ("filter", FILTERS))
+_KINDS = {"motion": MOTIONS, "sensor": SENSORS, "filter": FILTERS}
+
+
+def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
+    """Return every name with its summary, one finished sentence, by kind.
+
+    Parameters
+    ----------
+    plugins : iterable of str, optional
+        Modules whose classes are listed too; they are loaded. What installed packages offer is listed, not loaded.
+    """
+    loaded = load_plugins(plugins)
+    return {
+        **{f"{kind}s": _offered(kind, registry, loaded) for kind, registry in _KINDS.items()},
+        "turntable_presets": _heads("testbed.models", "presets"),
+        "sensor_presets": _heads("testbed.sensors", "presets"),
+        "beliefs": _heads("testbed.fusion", "beliefs"),
+        "band_sets": _heads("testbed.fusion", "bands"),
+        "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
+        "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }
-    table["turntable preset"] = _heads("testbed.models", "presets")
-    table["sensor preset"] = _heads("testbed.sensors", "presets")
-    table["belief"] = _heads("testbed.fusion", "beliefs")
-    table["band set"] = _heads("testbed.fusion", "bands")
-    table["drift model"] = {name: _first_line(fit).split(";")[0] for name, (_, fit, _) in METHODS.items()}
-    table["paper"] = {name: _first_line(importlib.import_module(module)) for name, module in PAPERS.items()}
-    return table
 
 
-def _first_line(part: Any) -> str:
-    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+def _offered(kind: str, registry: Mapping[str, str], loaded: Plugins) -> dict[str, str]:
+    return {
+        **{name: _summary(resolve(kind, name, registry)) for name in registry},
+        **{name: f"Offered by {package}." for name, package in offered(kind).items()},
+        **{name: _summary(part) for name, part in loaded.classes() if _kind(part) == kind},
+    }
+
+
+def _kind(part: type[Any]) -> str | None:
+    """Return what a class of a plug-in is for a scenario; None if it is nothing."""
+    if issubclass(part, Motion):
+        return "motion"
+    if issubclass(part, Sensor):
+        return "sensor"
+    return "filter" if hasattr(part, "process") else None
+
+
+def _summary(part: Any) -> str:
+    """Return the first paragraph of a docstring without its markup."""
+    paragraph = (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+    return re.sub(r"(:\w+:)?`", "", paragraph)
 
 
 def _heads(package: str, folder: str) -> dict[str, str]:

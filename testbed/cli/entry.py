@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _GONE = 141  # whoever read the output has gone, as in `testbed list | head -1`: 128 + SIGPIPE, as the shell says it
 _INTERRUPTED = "interrupted; nothing was left behind"
 _FULL = {errno.ENOSPC, errno.EDQUOT}
+_COMPLETION = "_TESTBED_COMPLETE"
 _SHOW_CURSOR = "\x1b[?25h"
 
 
@@ -43,7 +44,13 @@ def main() -> None:
 def _run() -> int:
     from testbed.cli.app import app
 
-    status = app(standalone_mode=False)
+    try:
+        status = app(standalone_mode=False)
+    except SystemExit as end:
+        # What the shell asks in order to complete a line is answered with an exit of the command-line library.
+        if _COMPLETION in os.environ:
+            return int(end.code or OK)
+        raise
     # The command-line library turns an interrupt into its own exit status.
     if status == INTERRUPTED:
         raise KeyboardInterrupt

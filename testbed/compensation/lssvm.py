@@ -168,7 +168,7 @@ def leave_one_out(X: FloatArray, y: FloatArray, gamma: float, width2: float) -> 
     return residuals
 
 
-def block_residuals(X: FloatArray, y: FloatArray, gamma: float, width2: float, blocks: Sequence[slice]) -> FloatArray:
+def kernel_residuals(X: FloatArray, y: FloatArray, gamma: float, width2: float, blocks: Sequence[slice]) -> FloatArray:
     r"""Return each row's error under the machine trained without the block that holds it.
 
     .. math:: r_B = M_{BB}^{-1} a_B, \quad M = A^{-1} - \eta \eta' / 1'\eta

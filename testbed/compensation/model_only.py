@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from testbed.compensation.record import Record
     from testbed.signals import FloatArray
 
-    Fit = Callable[[training.Rows, int], tuple[Lssvm | Polynomial, float]]
+    Fit = Callable[[training.TrainingRows, int], tuple[Lssvm | Polynomial, float]]
 
 _FORMAT, _VERSION = "testbed drift model", 1
 _MACHINES: dict[str, type[Lssvm | Polynomial]] = {"lssvm": Lssvm, "polynomial": Polynomial}

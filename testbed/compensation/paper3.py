@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from testbed.compensation.record import Record
-    from testbed.compensation.training import Rows
+    from testbed.compensation.training import TrainingRows
     from testbed.signals import FloatArray
 
 # Equation (21) and below: the box of the wolves for gamma and sigma^2.
@@ -208,9 +208,9 @@ def _regress(record: Record, signal: FloatArray, options: PaperOptions, seed: in
     return machine.predict(rows.scaling.apply(features)), best
 
 
-def _errors(rows: Rows, point: FloatArray, options: PaperOptions) -> FloatArray:
+def _errors(rows: TrainingRows, point: FloatArray, options: PaperOptions) -> FloatArray:
     gamma, width2 = float(point[0]), float(point[1])
     if options.fitness == "blocked":
-        return lssvm.block_residuals(rows.Z, rows.y, gamma, width2, rows.folds)
+        return lssvm.kernel_residuals(rows.Z, rows.y, gamma, width2, rows.folds)
     # The last row of equation (20): e = a / gamma.
     return Lssvm.fit(rows.Z, rows.y, gamma, width2).weights / gamma

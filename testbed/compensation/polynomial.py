@@ -65,7 +65,7 @@ def penalised(U: FloatArray, y: FloatArray, ridge: FloatArray) -> FloatArray:
     return weights
 
 
-def block_residuals(U: FloatArray, y: FloatArray, ridge: FloatArray, blocks: Sequence[slice]) -> FloatArray:
+def ridge_residuals(U: FloatArray, y: FloatArray, ridge: FloatArray, blocks: Sequence[slice]) -> FloatArray:
     r"""Return each row's error under the `penalised` fit without the block that holds it.
 
     .. math:: r_B = (I - H_{BB})^{-1} (y - H y)_B, \quad H = U (U'U + \mathrm{diag}\,\rho)^{-1} U'

@@ -37,7 +37,7 @@ _CORNER = 0.017
 
 
 @dataclass(frozen=True)
-class Rows:
+class TrainingRows:
     """Training rows.
 
     Parameters
@@ -70,7 +70,7 @@ class Rows:
     n_play: int
 
 
-def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> Rows:
+def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> TrainingRows:
     """Form rows from cycles: features at full rate, then means over whole blocks.
 
     Parameters
@@ -86,7 +86,7 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
 
     Returns
     -------
-    Rows
+    TrainingRows
         Standardised by their own statistics.
 
     Raises
@@ -101,8 +101,8 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
     shortest, total = min(cycle.duration for cycle in cycles), sum(cycle.duration for cycle in cycles)
     if not block > _AVERAGE or shortest < 2.0 * block:
         msg = (
-            f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, got one of "
-            f"{shortest:g} s"
+            f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, "
+            f"got one of {shortest:g} s"
         )
         raise ValueError(msg)
     average = _AVERAGE if most is None else max(_AVERAGE, total / most)
@@ -115,7 +115,9 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
     ends = np.cumsum([0, *(len(part) for part in X)])
     whole = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
     folds = [fold for rows in whole for fold in _folds(rows, block / average)]
-    return Rows(scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds, whole, average, len(features.plays))
+    return TrainingRows(
+        scaling.apply(np.concatenate(X)), y - mean, mean, scaling, folds, whole, average, len(features.plays)
+    )
 
 
 def block_means(values: FloatArray, n_mean: int) -> FloatArray:
@@ -145,28 +147,30 @@ def _folds(rows: slice, fold: float) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
-def fit_polynomial(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit by least squares with the penalty of least blocked error; returns it and the rms of that error [rad/s].
+def fit_polynomial(rows: TrainingRows, _seed: int = 0) -> tuple[Polynomial, float]:
+    """Fit by least squares with the penalty of least blocked error.
+
+    Returns it and the rms of that error [rad/s].
 
     Parameters
     ----------
-    rows : Rows
+    rows : TrainingRows
         Training rows.
     """
     weights, error = _least_squares(np.column_stack([np.ones(rows.y.size), rows.Z]), rows.y, 1, rows.folds)
     return Polynomial(weights[1:], float(weights[0])), error
 
 
-def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift; returns as
-    `fit_polynomial`.
+def fit_coloured(rows: TrainingRows, _seed: int = 0) -> tuple[Polynomial, float]:
+    """Fit by least squares under 1/f noise, each cycle with a constant of its own that is no drift.
 
+    Returns as `fit_polynomial`.
     The error is that of the whitened rows: what is new in a row beyond the noise before it, in units of the noise's
     variance.
 
     Parameters
     ----------
-    rows : Rows
+    rows : TrainingRows
         Training rows.
     """
     U, v = whiten(rows.Z, rows.y, rows.cycles, _CORNER * rows.average)
@@ -175,46 +179,48 @@ def fit_coloured(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
     return Polynomial(weights[n_cycle:], 0.0), error
 
 
-def fit_process(rows: Rows, _seed: int = 0) -> tuple[Polynomial, float]:
-    """Fit as `fit_coloured`, but as a Gaussian process: prior variances of the largest likelihood, play operators with
-    one of their own.
+def fit_process(rows: TrainingRows, _seed: int = 0) -> tuple[Polynomial, float]:
+    """Fit a Gaussian process under 1/f noise, with the prior variances of the largest likelihood.
 
-    So hysteresis is believed only as far as the cycles show it.
+    As `fit_coloured` otherwise.
+    Play operators have a variance of their own, so hysteresis is believed only as far as the cycles show it.
 
     Parameters
     ----------
-    rows : Rows
+    rows : TrainingRows
         Training rows.
     """
     U, v = whiten(rows.Z, rows.y, rows.cycles, _CORNER * rows.average)
     n_cycle, n_feature = len(rows.cycles), rows.Z.shape[1]
     group = np.repeat([-1, 0, 1], [n_cycle, n_feature - rows.n_play, rows.n_play])
     ridge = polynomial.likeliest_ridge(U, v, group)
-    error = _rms(polynomial.block_residuals(U, v, ridge, rows.folds))
+    error = _rms(polynomial.ridge_residuals(U, v, ridge, rows.folds))
     return Polynomial(polynomial.penalised(U, v, ridge)[n_cycle:], 0.0), error
 
 
 def _least_squares(U: FloatArray, y: FloatArray, n_free: int, folds: list[slice]) -> tuple[FloatArray, float]:
     """Return the weights under the penalty of least blocked error, and that error; the first columns are free."""
     ridges = [y.size * penalty * (np.arange(U.shape[1]) >= n_free) for penalty in _PENALTIES]
-    errors = [_rms(polynomial.block_residuals(U, y, ridge, folds)) for ridge in ridges]
+    errors = [_rms(polynomial.ridge_residuals(U, y, ridge, folds)) for ridge in ridges]
     best = int(np.argmin(errors))
     return polynomial.penalised(U, y, ridges[best]), errors[best]
 
 
-def fit_lssvm(rows: Rows, seed: int) -> tuple[Lssvm, float]:
-    """Fit a machine with gamma and sigma^2 of least blocked error; returns it and the rms of that error [rad/s].
+def fit_lssvm(rows: TrainingRows, seed: int) -> tuple[Lssvm, float]:
+    """Fit a least-squares support vector machine with gamma and sigma^2 of least blocked error.
+
+    Returns it and the rms of that error [rad/s].
 
     Parameters
     ----------
-    rows : Rows
+    rows : TrainingRows
         Training rows.
     seed : int
         Of the search.
     """
 
     def objective(point: FloatArray) -> float:
-        return float(np.log(_rms(lssvm.block_residuals(rows.Z, rows.y, point[0], point[1], rows.folds))))
+        return float(np.log(_rms(lssvm.kernel_residuals(rows.Z, rows.y, point[0], point[1], rows.folds))))
 
     best = evolve(objective, (_GAMMAS, _WIDTHS2), seed=seed, log=True)
     return Lssvm.fit(rows.Z, rows.y, best.point[0], best.point[1]), float(np.exp(best.value))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from testbed.allan.fit import term_variance
 from testbed.drift.leak import DRIFT_PERIOD, LEAST_GAIN
-from testbed.drift.quality import block_means
+from testbed.drift.quality import timed_means
 from testbed.pages.palette import FILTERS, SENSORS, TRUTH
 from testbed.pages.svg import INK, STYLE
 from testbed.units import CELSIUS, DEG_H
@@ -55,10 +55,10 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
         Rates [deg/h], each less its mean, and temperature [degC] against time [h].
     """
     fs = record.sample_rate_hz
-    hours = block_means(np.arange(record.rate.size) / fs / 3600.0, fs)
+    hours = timed_means(np.arange(record.rate.size) / fs / 3600.0, fs)
 
     def shown(rate: FloatArray) -> FloatArray:
-        means = block_means(rate, fs) / DEG_H
+        means = timed_means(rate, fs) / DEG_H
         centred: FloatArray = means - means.mean()
         return centred
 
@@ -70,7 +70,7 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
         if drift is not None:
             top.plot(hours, shown(drift), color=TRUTH, linewidth=1.3, linestyle=(0, (3, 1.5)), label="true drift")
         middle.plot(hours, shown(compensated), color=FILTERS[0], linewidth=0.9, label="compensated")
-        bottom.plot(hours, block_means(record.temperature, fs) - CELSIUS, color=SENSORS[3], linewidth=1.3)
+        bottom.plot(hours, timed_means(record.temperature, fs) - CELSIUS, color=SENSORS[3], linewidth=1.3)
         top.set_ylabel("rate [deg/h]")
         middle.set_ylabel("rate [deg/h]")
         bottom.set(ylabel="T [°C]", xlabel="time [h]", xlim=(0.0, float(hours[-1])))
@@ -81,7 +81,9 @@ def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | No
     return figure
 
 
-def allan_figure(qualities: Mapping[str, Quality], styles: Mapping[str, tuple[object, object]] = CURVES) -> Figure:
+def residual_allan_figure(
+    qualities: Mapping[str, Quality], styles: Mapping[str, tuple[object, object]] = CURVES
+) -> Figure:
     """Draw Allan deviations with their 95 % bands, and the fitted sum of each that the noise model describes.
 
     Parameters

@@ -19,7 +19,7 @@ from testbed.drift.injection import (
     survivor,
     usable_periods,
 )
-from testbed.drift.quality import BLOCK, assess, block_std, described_to, low_pass
+from testbed.drift.quality import BLOCK, assess, block_std, described_to, smoothed
 from testbed.signals import sample_times
 from testbed.units import DEG_H
 
@@ -119,7 +119,7 @@ class Audit:
             )
 
 
-def audit(
+def find_leaks(
     compensate: Compensate,
     record: Record,
     plain: FloatArray,
@@ -171,7 +171,7 @@ def audit(
     return Audit(
         before=assess(record.rate, fs, fitted_to),
         after=assess(plain, fs, fitted_to),
-        low_passed=None if bandwidth is None else assess(low_pass(record.rate, fs, bandwidth), fs, fitted_to),
+        low_passed=None if bandwidth is None else assess(smoothed(record.rate, fs, bandwidth), fs, fitted_to),
         oracle=None if drift is None else assess(record.rate - drift, fs, fitted_to),
         gains=gains,
         step_gain=step_gain,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from testbed.drift.figures import allan_figure, drift_figure, gain_figure
-from testbed.drift.summary import summary
+from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
+from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.pages.template import render
 from testbed.runs.atomic import write_text
@@ -65,24 +65,28 @@ def write_audit(audited: Audited, folder: Path) -> Path:
     Path
         The page.
     """
-    figures = summary(audited.audit)
-    about = {
-        "method": audited.method,
-        "trained_on": list(audited.trained_on),
-        "record": audited.thermal.name,
-        "extrapolated": audited.extrapolated,
-    }
     # All made before the first is written: an interrupt does not leave half a folder.
     texts = {
-        "audit.json": json.dumps({**about, **figures}, indent=2, allow_nan=False) + "\n",
+        "audit.json": json.dumps(audit_document(audited), indent=2, allow_nan=False) + "\n",
         "gains.csv": _gains(audited.audit),
         "allan.csv": _allan(curves(audited.audit)),
-        "audit.html": _page(audited, figures),
+        "audit.html": _page(audited, audit_summary(audited.audit)),
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_text(folder / name, text)
     return folder / "audit.html"
+
+
+def audit_document(audited: Audited) -> dict[str, Any]:
+    """Return the content of audit.json: what was audited, and its figures with the units in their names."""
+    return {
+        "method": audited.method,
+        "trained_on": list(audited.trained_on),
+        "record": audited.thermal.name,
+        "extrapolated": audited.extrapolated,
+        **audit_summary(audited.audit),
+    }
 
 
 def curves(audit: Audit) -> dict[str, Quality]:
@@ -114,7 +118,7 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
     record = audited.thermal.record
     drawn = {
         "drift": drift_figure(record, audited.compensated, audited.thermal.drift),
-        "allan": allan_figure(curves(audited.audit)),
+        "allan": residual_allan_figure(curves(audited.audit)),
         "gain": gain_figure(audited.audit),
     }
     return render(

@@ -101,10 +101,10 @@ def block_std(rate: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> 
     block : float, optional
         Length of a block [s].
     """
-    return float(block_means(rate, sample_rate_hz, block).std())
+    return float(timed_means(rate, sample_rate_hz, block).std())
 
 
-def block_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> FloatArray:
+def timed_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK) -> FloatArray:
     """Return the means over blocks, shape (n_block,), an incomplete last block left out.
 
     Parameters
@@ -119,7 +119,7 @@ def block_means(values: FloatArray, sample_rate_hz: float, block: float = BLOCK)
     return training.block_means(values, max(1, round(block * sample_rate_hz)))
 
 
-def low_pass(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:
+def smoothed(rate: FloatArray, sample_rate_hz: float, bandwidth: float) -> FloatArray:
     r"""Return the record through a zero-phase low-pass, twice a second-order Butterworth filter, -3 dB at `bandwidth`.
 
     The two passes have the gain :math:`1 / (1 + (f/f_c)^4)`, so :math:`f_c = f_{3dB} (\sqrt{2} - 1)^{-1/4}`.

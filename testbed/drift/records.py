@@ -10,58 +10,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed import units
 from testbed.compensation.record import Record
-from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.runs.text import ColumnFile, frequency, refusal, unit_factor
+from testbed.drift.columns import OPTIONS, Columns
+from testbed.errors import UnknownNameError
+from testbed.logs.choice import channel_map, time_map
+from testbed.logs.formats import open_table
+from testbed.logs.names import quantity_of
+from testbed.logs.options import quantity, refusal
+from testbed.logs.plan import find_column, labels, option_keys, plan
+from testbed.logs.reader import read_plans
 from testbed.units import CELSIUS, DEG_H
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from testbed.logs.logmap import TimeMap
+    from testbed.logs.plan import Plan
+    from testbed.logs.table import Table
     from testbed.signals import FloatArray
-
-# Of a text file, by the field of `Columns`.
-OPTIONS = {
-    "rate": "--column",
-    "rate_unit": "--unit",
-    "temperature": "--temperature",
-    "temperature_unit": "--temperature-unit",
-    "sample_rate": "--rate",
-    "time": "--time",
-    "time_unit": "--time-unit",
-}
-
-
-@dataclass(frozen=True)
-class Columns:
-    """How to read a text file; a run folder needs none of it but, where it has several such gyros, `sensor`.
-
-    Parameters
-    ----------
-    rate, temperature : str
-        Columns, by their name in the header or their number from 1 on.
-    rate_unit, temperature_unit : str
-        Their units, such as ``deg/h`` and ``degC``.
-    sample_rate : str, optional
-        In hertz or with its unit, unless `time` is given.
-    time : str, optional
-        Column of the time.
-    time_unit : str
-        Its unit.
-    sensor : str, optional
-        Of a run folder.
-    """
-
-    rate: str = "rate"
-    temperature: str = "temperature"
-    rate_unit: str = "deg/h"
-    temperature_unit: str = "degC"
-    sample_rate: str | None = None
-    time: str | None = None
-    time_unit: str = "s"
-    sensor: str | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +64,7 @@ class ThermalRecord:
         )
 
 
-def read(source: Path, columns: Columns) -> ThermalRecord:
+def read_thermal(source: Path, columns: Columns) -> ThermalRecord:
     """Return the record of a run folder or of a text file.
 
     Parameters
@@ -118,9 +85,9 @@ def read(source: Path, columns: Columns) -> ThermalRecord:
         If something is missing, not understood, no number or uneven in time.
     """
     if source.is_dir():
-        return read_run(source, columns.sensor)
+        return read_thermal_run(source, columns.sensor)
     if not source.is_file():
-        raise refusal(source, "expected a text file or a run folder, got neither")
+        raise refusal(source, "expected a recording or a run folder, got neither")
     return read_file(source, columns)
 
 
@@ -147,7 +114,7 @@ def check_options(sources: Sequence[Path], columns: Columns) -> None:
                 raise refusal(sources[0], "expected a text file with it; a run folder knows its signals", option)
 
 
-def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
+def read_thermal_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     """Return the readings of a gyro with a thermometer.
 
     Parameters
@@ -167,9 +134,9 @@ def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     ScenarioError
         If it is no run folder, or has no such gyro or several.
     """
-    from testbed.runs.folder import open_run
+    from testbed.runs.results import RunRecord
 
-    run = open_run(folder)
+    run = RunRecord.open(folder)
     known = [name for name, signals in run.sensors.items() if "temperature" in signals]
     if sensor is not None and sensor not in known:
         raise refusal(folder, str(UnknownNameError("sensor with a thermometer", sensor, known)), "--sensor")
@@ -185,7 +152,7 @@ def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
 
 
 def read_file(path: Path, columns: Columns) -> ThermalRecord:
-    """Return two columns of a text file (commas, semicolons, tabs or spaces; ``#`` starts a comment; header or not).
+    """Return two columns of a recording of any format.
 
     Parameters
     ----------
@@ -204,28 +171,39 @@ def read_file(path: Path, columns: Columns) -> ThermalRecord:
     ScenarioError
         If something is missing, not understood, no number or uneven in time; with the line.
     """
-    rate_factor = unit_factor(columns.rate_unit, "rad/s", "deg/h", "--unit")
-    zero, kelvin = _temperature_scale(columns.temperature_unit)
-    second = unit_factor(columns.time_unit, "s", "h", "--time-unit")
-    if (columns.sample_rate is None) == (columns.time is None):
-        got = "neither" if columns.time is None else "both"
-        raise refusal(path, f"expected either the sample rate (--rate) or the column of the time (--time), got {got}")
-    table = ColumnFile(path)
-    wanted = [table.index(columns.rate, "--column"), table.index(columns.temperature, "--temperature")]
-    clock = [] if columns.time is None else [table.index(columns.time, "--time")]
-    values = table.read(wanted + clock)
-    rate_hz = frequency(columns.sample_rate) if columns.sample_rate else 1.0 / table.step(values[:, 2] * second)
-    record = _record(path, values[:, 0] * rate_factor, zero + kelvin * values[:, 1], rate_hz)
-    return ThermalRecord(path.name, record, None)
+    if columns.sample_rate is not None and columns.time is not None:
+        raise refusal(path, "expected either the sample rate (--rate) or the column of the time (--time), got both")
+    table = open_table(path)
+    time = time_map(
+        columns.time,
+        columns.time_unit,
+        quantity(columns.sample_rate, "Hz", "100 Hz", "--rate") if columns.sample_rate else None,
+    )
+    plans = [
+        _planned(table, "rate", columns.rate, columns.rate_unit, "deg/h", time),
+        _planned(table, "temperature", columns.temperature, columns.temperature_unit, "degC", time),
+    ]
+    rate, temperature = read_plans(plans).values()
+    return ThermalRecord(path.name, _record(path, rate.whole(), temperature.whole(), rate.rate_hz), None)
 
 
-def _temperature_scale(unit: str) -> tuple[float, float]:
-    """Return 0 of the unit in kelvin, and its size."""
-    try:
-        zero, one = (units.parse(f"{value} {unit}", "K", example=f"{value} degC") for value in (0, 1))
-    except ValueError as error:
-        raise ScenarioError([Problem(str(error), key="--temperature-unit")]) from error
-    return zero, one - zero
+def _planned(table: Table, name: str, column: str, unit: str | None, usual: str, time: TimeMap | None) -> Plan:
+    """Return how the rate or the temperature is read, in the unit said, that of the file, or the usual one."""
+    rate = name == "rate"
+
+    def keys(field: str) -> str:
+        return (
+            option_keys(field) if rate or field not in {"column", "unit"} else f"--{name}{'-unit' * (field == 'unit')}"
+        )
+
+    found = labels(table)[find_column(table, column, keys("column"))].unit
+    chosen = unit or found or usual
+    if quantity_of(chosen) != name:
+        quantity = "K" if name == "temperature" else "rad/s"
+        raise refusal(
+            table.path, f"expected a quantity in {quantity}, such as '1 {usual}', got {chosen!r}", keys("unit")
+        )
+    return plan(name, channel_map(column=column, unit=chosen, time=time), table, keys)
 
 
 def _record(source: Path, rate: FloatArray, temperature: FloatArray, sample_rate_hz: float) -> Record:

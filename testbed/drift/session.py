@@ -5,32 +5,35 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.compensation import PAPER, paper3
 from testbed.compensation.model_only import METHODS, DriftModel, train
-from testbed.drift.leak import audit
+from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
-from testbed.drift.records import Columns, ThermalRecord, check_options, read
+from testbed.drift.records import ThermalRecord, check_options, read_thermal
 from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.runs.atomic import write_text
 from testbed.runs.folder import failing_as_run_error
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from testbed.compensation.record import Record
+    from testbed.drift.columns import Columns
     from testbed.signals import FloatArray
 
 # A rate taken for a temperature moves by less, and so does an oven that was not switched on.
 LEAST_SPAN = 1.0  # K
 
 
-def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Path) -> Iterator[str]:
-    """Train a model on thermal cycles, write it, and yield the lines to print.
+def train_model(
+    sources: Sequence[Path], columns: Columns, method: str, out: Path, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Train a model on thermal cycles and write it.
 
     Parameters
     ----------
@@ -42,11 +45,13 @@ def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Pat
         Kind of regression.
     out : Path
         Model file (JSON).
+    tell : callable
+        Is told what is being done.
 
-    Yields
-    ------
-    str
-        One line.
+    Returns
+    -------
+    dict
+        Method, the cycles' names and the error of the cross-validation, noise of the means included.
 
     Raises
     ------
@@ -59,11 +64,11 @@ def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Pat
     _check_file(out)
     cycles: list[ThermalRecord] = []
     for source in sources:
-        cycle = read(source, columns)
+        cycle = read_thermal(source, columns)
         _check_cycle(source, cycle, cycles)
         cycles.append(cycle)
-        yield f"cycle: {cycle}"
-    yield f"training {method} ..."
+        tell(f"cycle: {cycle}")
+    tell(f"training {method} ...")
     try:
         model = train([cycle.record for cycle in cycles], method=method)
     except ValueError as error:
@@ -72,11 +77,11 @@ def train_model(sources: Sequence[Path], columns: Columns, method: str, out: Pat
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, json.dumps(document, allow_nan=False) + "\n")
-    yield (
-        f"method {method}; error of the cross-validation {model.blocked_error / DEG_H:.4g} deg/h, noise of the "
-        f"means included"
-    )
-    yield f"written: {out}"
+    return {
+        "method": method,
+        "cycles": [cycle.name for cycle in cycles],
+        "blocked_error_deg_h": model.blocked_error / DEG_H,
+    }
 
 
 def _check_cycle(source: Path, cycle: ThermalRecord, before: Sequence[ThermalRecord]) -> None:
@@ -122,8 +127,8 @@ def _read_document(path: Path) -> tuple[DriftModel, dict[str, str]]:
         raise ScenarioError([Problem(msg, file=str(path))]) from error
 
 
-def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterator[str]:
-    """Compensate a record, write it as a text file, and yield the lines to print.
+def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Compensate a record and write it as a text file.
 
     Parameters
     ----------
@@ -136,11 +141,13 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterat
     out : Path
         Text file to write: time [s], compensated rate and drift [deg/h], and whether the temperature was outside the
         trained range.
+    tell : callable
+        Is told what is being done.
 
-    Yields
-    ------
-    str
-        One line.
+    Returns
+    -------
+    dict
+        Method, name of the record and the share of its samples outside the trained range.
 
     Raises
     ------
@@ -149,8 +156,8 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterat
     """
     check_options([source], columns)
     _check_file(out)
-    model, thermal = read_model(path), read(source, columns)
-    yield f"record: {thermal}"
+    model, thermal = read_model(path), read_thermal(source, columns)
+    tell(f"record: {thermal}")
     block = model.apply(thermal.record)
     t = np.arange(block.rate.size) / thermal.record.sample_rate_hz
     rows = zip(t, block.rate / DEG_H, block.drift / DEG_H, block.extrapolated, strict=True)
@@ -158,8 +165,7 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path) -> Iterat
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
-    yield f"{block.extrapolated.mean():.2%} of the samples outside the trained range"
-    yield f"written: {out}"
+    return {"method": model.method, "record": thermal.name, "extrapolated": float(block.extrapolated.mean())}
 
 
 def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> Audited:
@@ -187,7 +193,7 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     if out.exists() and not out.is_dir():
         raise ScenarioError([Problem("expected a folder to write, got a file", key="--out", file=str(out))])
     trained = None if model == PAPER else _read_document(Path(model))
-    thermal = read(source, columns)
+    thermal = read_thermal(source, columns)
     tell(f"compensating {thermal}")
     try:
         audited = (
@@ -205,7 +211,7 @@ def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited
         return paper3.compensate(record).rate
 
     compensated = compensate(thermal.record)
-    found = audit(compensate, thermal.record, compensated, thermal.drift, tell)
+    found = find_leaks(compensate, thermal.record, compensated, thermal.drift, tell)
     return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
 
 
@@ -213,7 +219,7 @@ def _audit_trained(
     path: Path, model: DriftModel, trained_on: dict[str, str], thermal: ThermalRecord, tell: Callable[[str], None]
 ) -> Audited:
     block = model.apply(thermal.record)
-    found = audit(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
+    found = find_leaks(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
     found = replace(found, seen=thermal.fingerprint in trained_on)
     name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
     return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))

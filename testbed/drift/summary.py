@@ -12,6 +12,7 @@ from testbed.judging.allan_analysis import TERMS
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
+    from testbed.allan.fit import AllanFit
     from testbed.drift.leak import Audit
     from testbed.drift.quality import Quality
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 LETTERS = ("Q", "N", "B")
 
 
-def summary(audit: Audit) -> dict[str, Any]:
+def audit_summary(audit: Audit) -> dict[str, Any]:
     """Return the figures of an audit; None where they are not known or mean nothing.
 
     Parameters
@@ -78,22 +79,12 @@ def quality_summary(quality: Quality) -> dict[str, Any]:
         "block_std_100s_deg_h": quality.block_std / DEG_H,
         "allan_deviation_1h_deg_h": None if hour is None else hour / DEG_H,
         "fitted_to_s": quality.fitted_to,
-        "coefficients": None if quality.fit is None else _coefficients(quality),
+        "coefficients": None if quality.fit is None else _coefficients(quality.fit),
     }
 
 
-def _coefficients(quality: Quality) -> dict[str, Any]:
-    found = {}
-    for term in TERMS:
-        if term.letter in LETTERS:
-            value = getattr(quality.fit, term.name)
-            found[term.letter] = {
-                "value": term.in_unit(value.value) if value.identified else None,
-                "lower": term.in_unit(value.lower),
-                "upper": term.in_unit(value.upper),
-                "unit": term.unit,
-            }
-    return found
+def _coefficients(fit: AllanFit) -> dict[str, Any]:
+    return {term.letter: term.summary(fit) for term in TERMS if term.letter in LETTERS}
 
 
 def _finite(value: float | None) -> float | None:

@@ -66,12 +66,15 @@ class SensorBelief(Part):
         Two-sided root density of the noise that passes the dynamics [rad/sqrt(s)].
     output_noise : float
         Two-sided root density of the noise on the reading [rad/sqrt(s)].
+    source : str
+        Where it is from, as shown beside results: the name of a shipped belief, "exact" or "given". It changes nothing.
     """
 
     numerator: tuple[Coefficient, ...]
     denominator: tuple[Coefficient, ...]
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
+    source: str = "given"
 
     @model_validator(mode="after")
     def _check(self) -> SensorBelief:
@@ -164,7 +167,10 @@ def _shipped(name: str) -> dict[str, SensorBelief]:
         kind = "belief"
         raise UnknownNameError(kind, name, names)
     content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
-    return {key: SensorBelief.model_validate(value, context={"border": True}) for key, value in content.items()}
+    return {
+        key: SensorBelief.model_validate({**value, "source": name}, context={"border": True})
+        for key, value in content.items()
+    }
 
 
 def check_belief(belief: Mapping[str, SensorBelief], sensors: Iterable[str]) -> None:
@@ -193,11 +199,40 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     UnknownNameError
         If no belief of that name is shipped.
     ValueError
-        If a transfer function or a noise is not acceptable.
+        If a transfer function or a noise is not acceptable, or the exact belief is asked for: only who knows the
+        simulated sensors has that.
+
+    Examples
+    --------
+    >>> sorted(load_belief("eq39"))
+    ['mems_gyro', 'mhd_ars']
+    >>> own = {"gyro": {"numerator": [1.0], "denominator": [0.01, 1.0], "output_noise": "0.3 deg/sqrt(h)"}}
+    >>> load_belief(own)["gyro"].denominator
+    (0.01, 1.0)
     """
+    if source == "exact":
+        msg = (
+            "belief: 'exact' is known of simulated instruments only, not of arrays; say of which, such as "
+            "belief={'mhd_ars': testbed.belief_of('sx300', exact=True)}"
+        )
+        raise ValueError(msg)
     if isinstance(source, str):
         return dict(_shipped(source))
     return {name: SensorBelief.model_validate(value) for name, value in source.items()}
+
+
+def declared(belief: Mapping[str, SensorBelief]) -> str:
+    """Return in words where a belief is from: one source, or that of each sensor.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Of each sensor.
+    """
+    sources = {one.source for one in belief.values()}
+    if len(sources) == 1:
+        return sources.pop()
+    return ", ".join(f"{name}: {one.source}" for name, one in belief.items())
 
 
 def default_belief() -> dict[str, SensorBelief]:

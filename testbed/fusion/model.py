@@ -152,8 +152,8 @@ def continuous_model(
         if use_input_noise and sensor.input_noise > 0.0:
             if one.D != 0.0:
                 msg = (
-                    f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; give it as output_noise, "
-                    f"or add a pole"
+                    f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; "
+                    "give it as output_noise, or add a pole"
                 )
                 raise ValueError(msg)
             Qc[part, part] = sensor.input_noise**2 * np.outer(one.B, one.B)

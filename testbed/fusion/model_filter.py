@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
-
-DEG = math.pi / 180.0
 
 Variance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", above=0.0)]
 

@@ -1,4 +1,4 @@
-"""Rate records to look at: a column of a text file, or what the sensors of a run read beyond the motion."""
+"""Rate records to look at: columns of a recording, or what the sensors of a run read beyond the motion."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import UnknownNameError
-from testbed.runs.text import ColumnFile, frequency, refusal, unit_factor
+from testbed.logs.choice import select
+from testbed.logs.inspection import remarks, word_of
+from testbed.logs.options import refusal
+from testbed.logs.selection import Selection
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from testbed.logs.channel import LogChannel
+    from testbed.logs.selection import TextOptions
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 
@@ -27,37 +32,38 @@ class Record:
     name : str
         For titles and file names.
     rate : ndarray, shape (n_time,)
-        Rate [rad/s].
+        Rate [rad/s]; NaN where a sample is lost.
     sample_rate_hz : float
         Its sample rate [Hz].
     content : str
         What it is, for the reader.
+    notes : tuple of str
+        What the reader found, took for granted or left out.
+    word : float
+        To what the rate is rounded [rad/s]; 0 if not known.
     """
 
     name: str
     rate: FloatArray
     sample_rate_hz: float
     content: str
+    notes: tuple[str, ...] = ()
+    word: float = 0.0
 
 
 def read(
-    source: Path,
-    *,
-    column: str | None = None,
-    unit: str | None = None,
-    rate: str | None = None,
-    time: str | None = None,
-    time_unit: str = "s",
-    sensor: str | None = None,
+    source: Path, wanted: Selection | None = None, text: TextOptions | None = None, sensor: str | None = None
 ) -> list[Record]:
     """Return the records that the command line asks for.
 
     Parameters
     ----------
     source : Path
-        Text file or run folder.
-    column, unit, rate, time, time_unit : str, optional
-        Of a file, as `read_file`; the rate as text, in hertz or with its unit.
+        Recording or run folder.
+    wanted : Selection, optional
+        Which columns of a recording, and what they mean.
+    text : TextOptions, optional
+        How a text file is written.
     sensor : str, optional
         Of a run, as `read_run`.
 
@@ -66,20 +72,40 @@ def read(
     ScenarioError
         If something is missing, not understood or belongs to the other kind of source.
     """
-    of_file = {"--column": column, "--unit": unit, "--rate": rate, "--time": time}
+    wanted = wanted or Selection()
     if source.is_dir():
-        for key, value in of_file.items():
-            if value is not None:
-                raise refusal(source, "expected a file with it; a run folder knows its signals", key)
+        given = ["--column"] * bool(wanted.column) + ["--map"] * bool(wanted.map) + wanted.given
+        if given:
+            raise refusal(source, "expected a file with it; a run folder knows its signals", given[0])
         return read_run(source, sensor)
     if sensor is not None:
         raise refusal(source, "expected a run folder with it", "--sensor")
     if not source.is_file():
-        raise refusal(source, "expected a text file or a run folder, got neither")
-    if unit is None:
-        raise refusal(source, "expected the unit of the column, such as deg/s", "--unit")
-    rate_hz = None if rate is None else frequency(rate)
-    return [read_file(source, unit=unit, column=column, sample_rate_hz=rate_hz, time=time, time_unit=time_unit)]
+        raise refusal(source, "expected a recording or a run folder, got neither")
+    channels = select(source, wanted, text)
+    return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
+
+
+def as_record(channel: LogChannel, name: str) -> Record:
+    """Return a channel of a recording as a record: on an even grid, lost samples NaN.
+
+    Parameters
+    ----------
+    channel : LogChannel
+        A rate, or increments or an angle.
+    name : str
+        For titles and file names.
+
+    Raises
+    ------
+    ScenarioError
+        If its samples are not even.
+    """
+    rate = channel.rate()
+    content = f"{channel.label} of {channel.table.path}"
+    # The rounding of increments and angles is no noise of its own in each sample of the rate.
+    word = word_of(channel) if channel.kind == "rate" else 0.0
+    return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
 
 
 def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
@@ -102,13 +128,16 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
     Raises
     ------
     ScenarioError
-        If it is no run folder, the sensor is not in it or its readings have gaps.
+        If it is no run folder, or the sensor is not in it or was never read.
     """
-    from testbed.runs.folder import open_run
-    from testbed.scenario.loader import load_scenario
+    from testbed.runs.results import RunRecord
+    from testbed.scenario.loader import load_instruments
 
-    run = open_run(folder)
-    scenario = load_scenario(folder / "scenario.yaml")
+    run = RunRecord.open(folder)
+    scenario = load_instruments(folder / "scenario.yaml")
+    if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
+        msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"
+        raise refusal(folder, msg, f"sensors.{sensor}")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")
     records = []
@@ -116,9 +145,8 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         instrument = scenario.sensors[name]
         noise = run.sensors[name].rate - _silent_readings(scenario, name, run.truth[f"{name}_rate"])
         noise = noise[math.ceil(scenario.frame.settle * instrument.sample_rate) :]
-        if not np.isfinite(noise).all():
-            missing = int(np.sum(~np.isfinite(noise)))
-            raise refusal(folder, f"expected readings without gaps, got {missing} that are missing", f"sensors.{name}")
+        if not np.isfinite(noise).any():
+            raise refusal(folder, "expected readings, got none", f"sensors.{name}")
         content = f"{name} of {scenario.name}, less its noise-free reading, from {scenario.frame.settle:g} s on"
         records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content))
     return records
@@ -129,58 +157,11 @@ def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> Fl
     from testbed.sensors.base import ExposedStage, Surroundings
 
     instrument, base = scenario.sensors[name], scenario.base_rate_hz
+    if true_rate.size != scenario.n_time:
+        # A sensor of a plug-in, which is not read here, asked for another clock.
+        base = true_rate.size / scenario.frame.duration
     stage = instrument.model_copy(update={"noise": False}).start(base, scenario.frame.seed, name)
     if not isinstance(stage, ExposedStage):
         return stage.process(true_rate)
     temperature = scenario.frame.temperature.at(0, true_rate.size, base)
     return stage.process_in(true_rate, Surroundings(temperature=temperature))
-
-
-def read_file(
-    path: Path,
-    *,
-    unit: str,
-    column: str | None = None,
-    sample_rate_hz: float | None = None,
-    time: str | None = None,
-    time_unit: str = "s",
-) -> Record:
-    """Return a column of a text file (commas, semicolons, tabs or spaces; ``#`` starts a comment; header or not).
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    unit : str
-        Unit of the column, such as ``deg/s``.
-    column : str, optional
-        Its name in the header, or its number from 1 on; may be left out if there is but one beside the time.
-    sample_rate_hz : float, optional
-        Sample rate [Hz], unless `time` is given.
-    time : str, optional
-        Column of the time, instead of the sample rate.
-    time_unit : str, optional
-        Its unit.
-
-    Returns
-    -------
-    Record
-        The record in SI.
-
-    Raises
-    ------
-    ScenarioError
-        If something is missing, not understood, no number, or uneven in time; with the line.
-    """
-    factor = unit_factor(unit, "rad/s", "deg/s", "--unit")
-    second = unit_factor(time_unit, "s", "ms", "--time-unit")
-    if (sample_rate_hz is None) == (time is None):
-        raise refusal(path, "expected either the sample rate (--rate) or the column of the time (--time)")
-    table = ColumnFile(path)
-    clock = None if time is None else table.index(time, "--time")
-    wanted = table.index(column, "--column") if column is not None else table.only_but(clock)
-    values = table.read([wanted] if clock is None else [wanted, clock])
-    rate_hz = sample_rate_hz or 0.0
-    if clock is not None:
-        rate_hz = 1.0 / table.step(values[:, 1] * second)
-    return Record(path.stem, values[:, 0] * factor, rate_hz, f"{table.label(wanted)} of {path}")

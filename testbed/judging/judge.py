@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.fusion.belief import declared
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
 from testbed.runs.block import first_due
+from testbed.runs.metrics import RunMetrics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,8 +65,14 @@ class Judge:
         self._errors[name].add(t, rate[settled:], truth[settled:], None if std is None else std[settled:])
         return rate[settled:] - truth[settled:], settled
 
-    def metrics(self) -> dict[str, Any]:
-        """Return the content of metrics.json."""
+    def metrics(self, versions: Mapping[str, str] | None = None) -> RunMetrics:
+        """Return the metrics of what was written.
+
+        Parameters
+        ----------
+        versions : mapping of str to str, optional
+            Of what the result depends on, to be noted with it.
+        """
         frame = self._scenario.frame
         psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
         floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
@@ -72,20 +81,21 @@ class Judge:
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
+                "belief": declared(spec.belief),
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 "floor_rmse_deg_s": floor_deg,
                 "optimum_rmse_deg_s": optimum_deg,
                 "consistency": self._consistency[name].result(),
             }
-            for name in self._scenario.fusion
+            for name, spec in self._scenario.fusion.items()
         }
         for row in fusion.values():
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
         from testbed.judging.budget import budget_summary
 
-        return {
+        found = {
             "scenario": self._scenario.name,
             "seed": frame.seed,
             "duration_s": frame.duration,
@@ -97,7 +107,10 @@ class Judge:
             "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
             "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
+            "versions": dict(versions or {}),
+            "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
+        return RunMetrics.model_validate(found)
 
     def _optima(self) -> tuple[float | None, dict[float, float]]:
         """Return what the best fixed filter of this very signal leaves [deg/s], and of each line alone, by frequency

@@ -9,7 +9,8 @@ import numpy as np
 
 from testbed.metrics.errors import ErrorMetrics
 from testbed.models.turntable.modes import coupled_modes
-from testbed.models.turntable.turntable import Turntable, TurntableParameters
+from testbed.models.turntable.parameters import TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.scenario.checks import command_peaks
 from testbed.scenario.step_choice import StepChoice, choose_step, excerpt
 from testbed.signals import BASE_RATE_HZ
@@ -67,6 +68,22 @@ class TableFacts:
     torque_limit: float | None
     truth_noise: float
     step: StepChoice
+
+    def summary(self) -> dict[str, Any]:
+        """Return the facts with units in their names, as they stand in metrics.json."""
+        limit = self.torque_limit
+        return {
+            "modes_hz": self.freq_hz.tolist(),
+            "modes_damping": self.damping.tolist(),
+            "required_torque_nm": self.required_torque,
+            "torque_limit_nm": limit,
+            "torque_margin": None if limit is None else 1.0 - self.required_torque / limit,
+            "truth_noise_deg_s": float(np.rad2deg(self.truth_noise)),
+            "engine": self.step.engine,
+            "step_s": self.step.step,
+            "step_factor": self.step.holds / self.step.substeps,
+            "step_error": self.step.error,
+        }
 
 
 def table_facts(scenario: Scenario, step: StepChoice | None = None) -> TableFacts:
@@ -143,21 +160,12 @@ class TableMetrics:
         """Return the entry "turntable" of metrics.json; deg/s, N m, Hz, None where undefined."""
         facts = table_facts(self._scenario, self._step)
         limit = facts.torque_limit
-        entry: dict[str, Any] = {"mode": self._scenario.turntable.mode, **_step(facts.step)}
+        entry: dict[str, Any] = {"mode": self._scenario.turntable.mode, **facts.summary()}
         for name, errors in self._errors.items():
             result = errors.result()
             entry[f"command_to_{name}_rms_deg_s"] = result["rmse_deg_s"]
             entry[f"command_to_{name}_lines"] = result["lines"]
         return entry | {
             "peak_torque_nm": self._peak,
-            "required_torque_nm": facts.required_torque,
-            "torque_limit_nm": limit,
             "torque_margin": None if limit is None else 1.0 - self._peak / limit,
-            "truth_noise_deg_s": float(np.rad2deg(facts.truth_noise)),
-            "modes_hz": facts.freq_hz.tolist(),
-            "modes_damping": facts.damping.tolist(),
         }
-
-
-def _step(choice: StepChoice) -> dict[str, Any]:
-    return {"step_s": choice.step, "step_error": choice.error, "step_factor": choice.holds / choice.substeps}

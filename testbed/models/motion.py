@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from testbed.errors import RunError
+from testbed.inputs.plugins import PluginError, running
 from testbed.parts import Part
 from testbed.signals import FloatArray, sample_times
 
@@ -20,7 +22,12 @@ RateFunction = Callable[[FloatArray], FloatArray]
 
 
 class Motion(Part):
-    """One term of the commanded motion."""
+    """One term of the commanded motion.
+
+    `example` is how a scenario may write it: the schema offers it, and the contract tests run on it.
+    """
+
+    example: ClassVar[dict[str, Any]] = {}
 
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the commanded rate [rad/s] as a pure function of time [s], shape (n_time,) -> (n_time,).
@@ -104,6 +111,46 @@ def ramp(t: FloatArray, length: float) -> FloatArray:
     x = np.clip(t / length, 0.0, 1.0)
     factor: FloatArray = x**3 * (10.0 + x * (6.0 * x - 15.0))
     return factor
+
+
+def watched(kind: str, motion: Motion, duration: float, rng: np.random.Generator) -> RateFunction:
+    """Start a motion of a plug-in and return its rate, which is checked whenever it is asked for.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the motion, for messages.
+    motion : Motion
+        To start.
+    duration : float
+        Length of the run [s].
+    rng : numpy.random.Generator
+        For the motion.
+
+    Raises
+    ------
+    RunError
+        If the motion raises anything; the returned function does too, and if a rate is not finite or has not one value
+        per time.
+    """
+
+    def rate(t: FloatArray) -> FloatArray:
+        value = np.asarray(_foreign(kind, lambda: term(t.copy())))
+        if value.shape != t.shape or value.dtype.kind != "f" or not np.isfinite(value).all():
+            msg = f"motion {kind}: expected finite rates of shape {t.shape}, got {value.dtype} of shape {value.shape}"
+            raise RunError(msg)
+        return value
+
+    term = _foreign(kind, lambda: motion.start(duration, rng))
+    return rate
+
+
+def _foreign(kind: str, call: Callable[[], Any]) -> Any:
+    try:
+        with running(f"motion {kind}"):
+            return call()
+    except PluginError as error:
+        raise RunError(str(error)) from error
 
 
 class MotionProfile:

@@ -1,4 +1,4 @@
-"""What the figures of a report share: envelopes, legend and margins, units and the axis of time."""
+"""What figures share: envelopes, legend and margins, units and the axis of time."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
     Parameters
     ----------
     template : str
-        File in `testbed/report/templates`.
+        File in `testbed/pages/templates`.
     figures : mapping of str to Figure
         Reach the template as `figures`, SVG by name.
     **values : Any

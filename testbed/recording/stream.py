@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import rgb
-from testbed.recording.envelope import Envelope
+from testbed.recording.detail import Detail
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -47,13 +47,13 @@ class Clock:
             stamps = np.rint(index * (1e9 / self.sample_rate_hz)).astype(np.int64)
         return stamps.astype("timedelta64[ns]")
 
-    def envelope(self, stride: int, *, detailed: bool) -> Envelope:
+    def chooser(self, stride: int, *, detailed: bool, gaps: bool) -> Detail:
         """Return the chooser for a signal with a sample at every `stride`-th base sample; without detail, extremes
         only.
         """
         start, end = (round(t * self.sample_rate_hz) for t in self.detail)
         window = (-(-start // stride), end // stride + 1) if detailed else (0, 0)
-        return Envelope(-(-self.n_time // stride), window)
+        return Detail(-(-self.n_time // stride), window, gaps=gaps)
 
 
 class Recording:
@@ -112,7 +112,7 @@ class Batch:
 
 
 class Signal:
-    """One scalar signal of the recording: its samples pass an `Envelope` and are sent in large chunks.
+    """One scalar signal of the recording: its samples pass a `Detail` and are sent in large chunks.
 
     Parameters
     ----------
@@ -128,6 +128,8 @@ class Signal:
         Of the line, in points of the screen.
     detailed : bool
         Whether it has every sample inside the window of the clock.
+    gaps : bool
+        Whether what is not finite is lost and leaves a gap; otherwise it was not due.
     """
 
     def __init__(
@@ -140,20 +142,21 @@ class Signal:
         color: str,
         width: float = 1.5,
         detailed: bool = True,
+        gaps: bool = True,
     ) -> None:
         self.entity = entity
         self._recording, self._stride = recording, stride
-        self._envelope = recording.clock.envelope(stride, detailed=detailed)
+        self._chooser = recording.clock.chooser(stride, detailed=detailed, gaps=gaps)
         self._batch = Batch(self._send, ROWS)
         recording.lines(entity, [name], [color], width)
 
     def write(self, values: FloatArray) -> None:
         """Add the next samples [unit of the entity]."""
-        self._batch.add(*self._envelope.process(values))
+        self._batch.add(*self._chooser.process(values))
 
     def finish(self) -> None:
         """Send what is still held back."""
-        self._batch.add(*self._envelope.finish())
+        self._batch.add(*self._chooser.finish())
         self._batch.flush()
 
     def _send(self, index: NDArray[np.int64], values: FloatArray) -> None:

@@ -40,7 +40,8 @@ class RecordingWriter:
     timeline `sim_time`.
 
     A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample,
-    and, if it is a rate or an error, every sample inside `detail`. Samples that are not finite are left out.
+    and, if it is a rate or an error, every sample inside `detail`. A lost reading leaves a gap in the line (NaN); what
+    is NaN in a diagnostic was not due and is left out.
 
     Parameters
     ----------
@@ -123,8 +124,9 @@ class RecordingWriter:
             stride = self._fusion_stride
             self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
             self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
-            for series, values in {"std": estimate.std, **estimate.diagnostics}.items():
-                self._add(f"/{key}/{series}", values, stride, name, key, detailed=False)
+            self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
+            for series, values in estimate.diagnostics.items():
+                self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
         self._write_poses(block)
 
     def close(self) -> None:
@@ -209,10 +211,18 @@ class RecordingWriter:
         width: float = 1.5,
         *,
         detailed: bool = True,
+        gaps: bool = True,
     ) -> None:
         if entity not in self._signals:
             self._signals[entity] = Signal(
-                self._recording, entity, stride, name=name, color=self._colors[key], width=width, detailed=detailed
+                self._recording,
+                entity,
+                stride,
+                name=name,
+                color=self._colors[key],
+                width=width,
+                detailed=detailed,
+                gaps=gaps,
             )
         self._signals[entity].write(values)
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import Problem, ScenarioError
 from testbed.pages.palette import series_colors
 from testbed.pages.template import render
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
-from testbed.report.folder import RunMetrics, open_run, read_metrics, read_text
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
+from testbed.runs.metrics import read_text
+from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from testbed.runs.metrics import RunMetrics
 
 REPORT = "report.html"
 
@@ -43,15 +45,21 @@ def write_report(run_dir: Path) -> Path:
         If the folder lacks a file, or a file is damaged; names it and what was expected.
     """
     run_dir = Path(run_dir)
-    if not run_dir.is_dir():
-        message = "expected a run folder (run.nc, metrics.json, scenario.yaml), got none"
-        raise ScenarioError([Problem(message, file=str(run_dir))])
-    metrics = read_metrics(run_dir / "metrics.json")
+    run = RunRecord.open(run_dir)
     scenario = read_text(run_dir / "scenario.yaml", "the resolved scenario (YAML text)")
-    with open_run(run_dir / "run.nc") as data:
-        digest = digest_run(data, metrics)
-    rewrite(run_dir, REPORT, _render(metrics, scenario, digest))
+    rewrite(run_dir, REPORT, _render(run.metrics, scenario, digest_run(run)))
     return run_dir / REPORT
+
+
+def run_figures(run: RunRecord) -> dict[str, Figure]:
+    """Return the figures of a run by name, as the report shows them.
+
+    Parameters
+    ----------
+    run : RunRecord
+        In memory or on disk.
+    """
+    return _figures(run.metrics, digest_run(run))
 
 
 def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
@@ -100,7 +108,8 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
     drawn = {"rates": rates_figure(digest, colors)}
     if digest.filter_errors:
         drawn["errors"] = errors_figure(digest, colors)
-    drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
+    if metrics.sources:
+        drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors)
     if metrics.budget is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from testbed.report.digest import Digest
-    from testbed.report.folder import Budget, RunMetrics, SourceMetrics
+    from testbed.runs.metrics import Budget, RunMetrics, SourceMetrics
 
 
 def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:

@@ -1,4 +1,4 @@
-"""What the figures show, gathered from ``run.nc`` in one pass over each signal with memory flat in duration."""
+"""What the figures show, gathered from a run in one pass over each signal with memory flat in duration."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.errors import Problem, ScenarioError
 from testbed.metrics.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
 from testbed.pages.envelope import Envelope
 
 if TYPE_CHECKING:
-    from testbed.report.folder import RunData, RunMetrics, Signal
+    from testbed.runs.metrics import RunMetrics
+    from testbed.runs.results import RunRecord
+    from testbed.runs.signals import Signals
     from testbed.signals import FloatArray
 
 BLOCK = 2**18
@@ -85,15 +88,32 @@ def zoom_window(metrics: RunMetrics, still: float = 1.0) -> tuple[float, float]:
     return metrics.settle_s, min(metrics.settle_s + length, metrics.duration_s)
 
 
-def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
+@dataclass(frozen=True)
+class _Column:
+    """One signal of a run, read in blocks."""
+
+    signals: Signals
+    name: str
+
+    @property
+    def n_time(self) -> int:
+        return self.signals.n_time
+
+    @property
+    def sample_rate_hz(self) -> float:
+        return self.signals.sample_rate_hz
+
+    def read(self, start: int, stop: int) -> FloatArray:
+        return np.asarray(self.signals.read(self.name, start, stop), dtype=np.float64)
+
+
+def digest_run(run: RunRecord) -> Digest:
     """Gather what the figures show.
 
     Parameters
     ----------
-    data : RunData
-        Open ``run.nc``.
-    metrics : RunMetrics
-        The run's metrics: names of sensors and filters, settle and lines.
+    run : RunRecord
+        In memory or on disk.
 
     Returns
     -------
@@ -103,20 +123,20 @@ def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
     Raises
     ------
     ScenarioError
-        If ``run.nc`` lacks a signal that ``metrics.json`` names, or its units or time base are wrong.
+        If the run lacks a signal that its metrics name, or its units or time base are wrong.
     """
-    truth = data.signal("truth", "rate")
+    metrics, truth = run.metrics, _column(run, "truth", "rate")
     zoom = zoom_window(metrics, max(1.0, FEWEST / truth.sample_rate_hz))
     rates = {}
     for group in ("commanded", "truth"):
-        signal = data.signal(group, "rate")
+        signal = _column(run, group, "rate")
         trace = _rate_trace(signal, zoom)
         for first in range(0, signal.n_time, BLOCK):
             _add_rate(trace, first, signal.read(first, min(first + BLOCK, signal.n_time)))
         rates[group] = trace
     errors = {}
     for group in [f"sensors/{name}" for name in metrics.sensors] + [f"fusion/{name}" for name in metrics.fusion]:
-        rates[group], errors[group] = _follow(data, group, truth, metrics, zoom)
+        rates[group], errors[group] = _follow(run, group, truth, zoom)
     return Digest(
         duration_s=metrics.duration_s,
         settle_s=metrics.settle_s,
@@ -125,23 +145,49 @@ def digest_run(data: RunData, metrics: RunMetrics) -> Digest:
         rates=rates,
         sensor_errors={name: errors[f"sensors/{name}"] for name in metrics.sensors},
         filter_errors={name: errors[f"fusion/{name}"] for name in metrics.fusion},
-        thermal={name: _thermal(data, name) for name in metrics.sensors if data.has(f"sensors/{name}", "temperature")},
+        thermal={name: _thermal(run, name) for name in metrics.sensors if "temperature" in run.sensors[name]},
     )
 
 
-def _thermal(data: RunData, name: str) -> ThermalTrace:
-    temperature = data.signal(f"sensors/{name}", "temperature", "K")
-    return ThermalTrace(_whole(temperature), _whole(data.signal("truth", f"{name}_drift")))
+def _column(run: RunRecord, group: str, name: str, unit: str = "rad/s") -> _Column:
+    """Return a signal, its presence and unit checked."""
+    signals = run.groups.get(group)
+    if signals is None or name not in signals:
+        raise _bad(run, f"{group}/{name}", "expected a variable with the coordinate time, got none")
+    if signals.units[name] != unit:
+        raise _bad(run, f"{group}/{name}", f"expected units {unit!r}, got {signals.units[name]!r}")
+    return _Column(signals, name)
 
 
-def _whole(signal: Signal) -> Envelope:
+def _stride(run: RunRecord, group: str, signal: _Column, reference: _Column) -> int:
+    """Return how many samples of `reference` lie in one step of `signal`; it must be a whole number."""
+    ratio = reference.sample_rate_hz / signal.sample_rate_hz
+    stride = round(ratio)
+    # Rates may come from the last time stamp: rounding leaves a relative error of about 1e-12, a drift of one sample
+    # over the run is 1 / n.
+    if stride < 1 or abs(ratio - stride) * signal.n_time > 0.5 or (signal.n_time - 1) * stride >= reference.n_time:
+        message = f"expected a time that steps by whole samples of truth inside its span, got a ratio of {ratio:.9g}"
+        raise _bad(run, f"{group}/time", message)
+    return stride
+
+
+def _bad(run: RunRecord, key: str, message: str) -> ScenarioError:
+    return ScenarioError([Problem(message, key, "" if run.folder is None else str(run.folder / "run.nc"))])
+
+
+def _thermal(run: RunRecord, name: str) -> ThermalTrace:
+    temperature = _column(run, f"sensors/{name}", "temperature", "K")
+    return ThermalTrace(_whole(temperature), _whole(_column(run, "truth", f"{name}_drift")))
+
+
+def _whole(signal: _Column) -> Envelope:
     envelope = Envelope(0, signal.n_time, signal.sample_rate_hz, N_BINS)
     for first in range(0, signal.n_time, BLOCK):
         envelope.process(first, signal.read(first, min(first + BLOCK, signal.n_time)))
     return envelope
 
 
-def _rate_trace(signal: Signal, zoom: tuple[float, float]) -> RateTrace:
+def _rate_trace(signal: _Column, zoom: tuple[float, float]) -> RateTrace:
     fs = signal.sample_rate_hz
     start, stop = min(round(zoom[0] * fs), signal.n_time - 1), min(round(zoom[1] * fs) + 1, signal.n_time)
     return RateTrace(Envelope(0, signal.n_time, fs, N_BINS), Envelope(start, stop, fs, N_BINS))
@@ -152,14 +198,12 @@ def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
     trace.zoom.process(first, rate)
 
 
-def _follow(
-    data: RunData, group: str, truth: Signal, metrics: RunMetrics, zoom: tuple[float, float]
-) -> tuple[RateTrace, ErrorTrace]:
+def _follow(run: RunRecord, group: str, truth: _Column, zoom: tuple[float, float]) -> tuple[RateTrace, ErrorTrace]:
     """Read one sensor or filter beside the truth."""
-    signal = data.signal(group, "rate")
-    std = data.signal(group, "std") if group.startswith("fusion/") else None
-    stride, fs = data.stride(group, signal, truth), signal.sample_rate_hz
-    settle = min(int(np.ceil(metrics.settle_s * fs - 1e-6)), signal.n_time)
+    signal = _column(run, group, "rate")
+    std = _column(run, group, "std") if group.startswith("fusion/") else None
+    stride, fs = _stride(run, group, signal, truth), signal.sample_rate_hz
+    settle = min(int(np.ceil(run.metrics.settle_s * fs - 1e-6)), signal.n_time)
     n_segment = segment_length(signal.n_time - settle)
     welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
     trace = _rate_trace(signal, zoom)
@@ -188,7 +232,7 @@ def _follow(
         freq_hz=freq_hz,
         density=density,
         n_segments=0 if welch is None else welch.n_segments,
-        band_rms=_band_rms(welch, metrics),
+        band_rms=_band_rms(welch, run.metrics),
     )
 
 

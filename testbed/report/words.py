@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from testbed.report.digest import Digest
-    from testbed.report.folder import RunMetrics, SourceMetrics
+    from testbed.runs.metrics import RunMetrics, SourceMetrics
 
 METRICS = {
     "rmse_deg_s": "RMSE",
@@ -25,6 +25,8 @@ METRICS = {
 # Columns that are the RMSE over a bound.
 RATIOS = {"ratio": "floor_rmse_deg_s", "optimum_ratio": "optimum_rmse_deg_s"}
 
+_SHOWN = {*METRICS, "inside_2_std"}
+
 
 def _best(sources: Mapping[str, SourceMetrics]) -> str | None:
     rmse = {name: source.rmse_deg_s for name, source in sources.items() if source.rmse_deg_s is not None}
@@ -33,8 +35,7 @@ def _best(sources: Mapping[str, SourceMetrics]) -> str | None:
 
 def over_bound(source: SourceMetrics, column: str) -> float | None:
     """Return RMSE over the bound of a column of RATIOS [-], None where either is undefined or the bound is zero."""
-    bound = getattr(source, RATIOS[column])
-    return source.rmse_deg_s / bound if source.rmse_deg_s is not None and bound else None
+    return source.over(getattr(source, RATIOS[column]))
 
 
 def summary(metrics: RunMetrics, digest: Digest) -> str:
@@ -62,7 +63,7 @@ def _accuracy(metrics: RunMetrics) -> list[str]:
     )
     text = [f"{among}: its error is {significant(rmse)} deg/s rms, phase included."]
     alone = metrics.sensors[sensor].rmse_deg_s if sensor else None
-    if alone is not None and rmse > 0:
+    if alone and rmse > 0:
         factor = alone / rmse
         compared = f"{significant(factor)} times smaller" if factor >= 1 else f"{significant(1 / factor)} times larger"
         text.append(
@@ -133,9 +134,10 @@ def further(metrics: RunMetrics) -> dict[str, dict[str, Any]]:
     found = {}
     table = {} if metrics.turntable is None else {"turntable": metrics.turntable}
     for name, source in {**table, **metrics.sensors, **metrics.fusion}.items():
-        extra = source.model_extra or {}
         numbers = {
-            key: value for key, value in extra.items() if isinstance(value, int | float) and not isinstance(value, bool)
+            key: value
+            for key, value in source.items()
+            if isinstance(value, int | float) and not isinstance(value, bool) and key not in _SHOWN
         }
         if numbers:
             found[name] = numbers

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
+import math
 from typing import TYPE_CHECKING
 
 from testbed.errors import ScenarioError
@@ -15,6 +17,12 @@ PAPERS = {
     "paper1": "testbed.reproduce.paper1",
     "paper2": "testbed.reproduce.paper2",
     "paper3": "testbed.reproduce.paper3",
+}
+# The tables of each paper, as CSV files in its folder; figures have files of their own.
+TABLES = {
+    "paper1": ("table_ii", "table_ii_defects"),
+    "paper2": ("scale_factor", "linearity"),
+    "paper3": ("table_2",),
 }
 # Seeds if none are asked for: the spread of Table II is over ten, what the others measure hardly scatters.
 SEEDS = {"paper1": 10, "paper2": 1, "paper3": 1}
@@ -52,3 +60,33 @@ def run_paper(name: str, seeds: int | None, out: Path) -> Iterator[str]:
         problem = f"--out: expected a folder that can be written, got {out}: {error.strerror}"
         raise ScenarioError(problem) from error
     yield from importlib.import_module(PAPERS[name]).report(seeds or SEEDS[name], out)
+
+
+def paper_tables(name: str, folder: Path) -> dict[str, list[dict[str, float | str | None]]]:
+    """Return the tables of a paper that `run_paper` wrote.
+
+    Parameters
+    ----------
+    name : str
+        One of `PAPERS`.
+    folder : Path
+        Where they are.
+
+    Returns
+    -------
+    dict of str to list of dict
+        Rows of each table by its name, columns as in its file; None where there is no number.
+    """
+    tables = {}
+    for table in TABLES[name]:
+        with (folder / f"{table}.csv").open(newline="", encoding="utf-8") as file:
+            tables[table] = [{key: _value(text) for key, text in row.items()} for row in csv.DictReader(file)]
+    return tables
+
+
+def _value(text: str) -> float | str | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return text or None
+    return value if math.isfinite(value) else None

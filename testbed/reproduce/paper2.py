@@ -17,6 +17,8 @@ from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.metrics.spectra import WelchDensity, log_average
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,15 +27,13 @@ if TYPE_CHECKING:
     from testbed.sensors.mhd_ars import MhdArs
     from testbed.signals import ComplexArray, FloatArray
 
-CLOCK_HZ = 20_000.0
-DEG = np.pi / 180.0
 CHANNELS = ("mems_gyro", "mhd_ars", "fused")
 # Volts per (deg/s) of the paper's fused output.
 PAPER_SCALE = 0.04
 
 
 @dataclass(frozen=True)
-class Protocol:
+class BenchProtocol:
     """The paper's protocol: amplitudes [deg/s], frequencies [Hz] and times [s].
 
     Parameters
@@ -73,11 +73,11 @@ def switched_on(**parameters: Any) -> AllanSrkf:
     **parameters : Any
         Of the filter.
     """
-    clock = dict.fromkeys(CHANNELS[:2], CLOCK_HZ)
+    clock = dict.fromkeys(CHANNELS[:2], BASE_RATE_HZ)
     return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**parameters))
 
 
-def read(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]:
+def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]:
     """Return the readings of both sensors and the fused rate.
 
     Parameters
@@ -94,10 +94,10 @@ def read(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]
     dict of str to ndarray, shape (n_time,)
         ``mems_gyro``, ``mhd_ars`` and ``fused`` [rad/s].
     """
-    gyro = load_preset("crs03").model_copy(update={"sample_rate": CLOCK_HZ})
+    gyro = load_preset("crs03").model_copy(update={"sample_rate": BASE_RATE_HZ})
     readings = {
-        "mems_gyro": gyro.start(CLOCK_HZ, seed, "mems_gyro").process(rate),
-        "mhd_ars": load_preset("mhd03").start(CLOCK_HZ, seed, "mhd_ars").process(rate),
+        "mems_gyro": gyro.start(BASE_RATE_HZ, seed, "mems_gyro").process(rate),
+        "mhd_ars": load_preset("mhd03").start(BASE_RATE_HZ, seed, "mhd_ars").process(rate),
     }
     return readings | {"fused": stage.process(readings).rate}
 
@@ -107,7 +107,7 @@ def mhd_response(freq_hz: FloatArray) -> ComplexArray:
     return load_preset("mhd03").response(freq_hz)
 
 
-def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, stage: AllanSrkf) -> list[float]:
+def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: BenchProtocol, stage: AllanSrkf) -> list[float]:
     """Return the amplitude of each channel for a sine.
 
     Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise
@@ -119,7 +119,7 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
         The sine [Hz], [deg/s].
     seed : int
         Seed of the noise.
-    protocol : Protocol
+    protocol : BenchProtocol
         Its times.
     stage : AllanSrkf
         The filter.
@@ -129,24 +129,24 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: Protocol, 
     list of float
         Fourier amplitudes over whole periods, in the order of `CHANNELS` [deg/s].
     """
-    first = round(protocol.settle * CLOCK_HZ)
+    first = round(protocol.settle * BASE_RATE_HZ)
     periods = np.ceil(protocol.observe * freq_hz - 1e-9)
-    n_time = first + round(periods / freq_hz * CLOCK_HZ)
-    turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / CLOCK_HZ
-    signals = read(amplitude * DEG * np.sin(turns), seed, stage)
+    n_time = first + round(periods / freq_hz * BASE_RATE_HZ)
+    turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / BASE_RATE_HZ
+    signals = bench_readings(amplitude * DEG * np.sin(turns), seed, stage)
     window = (1.0 - np.cos(turns[first:] / periods)) ** 2 / 1.5 if periods >= 3.0 else 1.0
     line = window * np.exp(-1j * turns[first:])
     return [float(2.0 * np.abs(np.mean(signals[name][first:] * line)) / DEG) for name in CHANNELS]
 
 
-def scale_factor(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
+def scale_factor(seed: int, protocol: BenchProtocol, **parameters: Any) -> FloatArray:
     """Return indicated over true amplitude, mean over the amplitudes, shape (n_freq, 3) in the order of `CHANNELS` [-].
 
     Parameters
     ----------
     seed : int
         Seed of the noise.
-    protocol : Protocol
+    protocol : BenchProtocol
         Grid and times.
     **parameters : Any
         Of the filter.
@@ -165,25 +165,27 @@ def scale_factor(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray
     )
 
 
-def settle_filter(seed: int, protocol: Protocol, **parameters: Any) -> Callable[[], AllanSrkf]:
+def settle_filter(seed: int, protocol: BenchProtocol, **parameters: Any) -> Callable[[], AllanSrkf]:
     """Return what makes filters that have run through `warm_up` at standstill.
 
     Parameters
     ----------
     seed : int
         Seed of the noise.
-    protocol : Protocol
+    protocol : BenchProtocol
         Its `warm_up`.
     **parameters : Any
         Of the filter.
     """
     stage = switched_on(**parameters)
     for second in range(0, round(protocol.warm_up), 10):
-        read(np.zeros(round(min(10.0, protocol.warm_up - second) * CLOCK_HZ)), 1000 * seed - 1 - second, stage)
+        bench_readings(
+            np.zeros(round(min(10.0, protocol.warm_up - second) * BASE_RATE_HZ)), 1000 * seed - 1 - second, stage
+        )
     return lambda: copy.deepcopy(stage)
 
 
-def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
+def linearity(seed: int, protocol: BenchProtocol, **parameters: Any) -> FloatArray:
     """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of
     `CHANNELS` [-].
 
@@ -194,7 +196,7 @@ def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
     ----------
     seed : int
         Seed of the noise.
-    protocol : Protocol
+    protocol : BenchProtocol
         Grid and times.
     **parameters : Any
         Of the filter.
@@ -212,14 +214,14 @@ def linearity(seed: int, protocol: Protocol, **parameters: Any) -> FloatArray:
     return np.array(rows)
 
 
-def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[FloatArray, FloatArray]:
+def noise_density(seed: int, protocol: BenchProtocol, **parameters: Any) -> tuple[FloatArray, FloatArray]:
     """Return Welch densities at standstill, averaged in logarithmic bins.
 
     Parameters
     ----------
     seed : int
         Seed of the noise.
-    protocol : Protocol
+    protocol : BenchProtocol
         Times.
     **parameters : Any
         Of the filter.
@@ -229,12 +231,12 @@ def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[Flo
     freq_hz, density : ndarray, shapes (n_bin,), (n_bin, 4)
         Frequency [Hz]; gyro, MHD ARS, fused, and MHD ARS referred to the rate by its response, two-sided [rad^2/s].
     """
-    n_time = round((protocol.warm_up + protocol.standstill) * CLOCK_HZ)
-    signals = read(np.zeros(n_time), seed, switched_on(**parameters))
+    n_time = round((protocol.warm_up + protocol.standstill) * BASE_RATE_HZ)
+    signals = bench_readings(np.zeros(n_time), seed, switched_on(**parameters))
     columns = []
     for name in CHANNELS:
-        welch = WelchDensity(CLOCK_HZ, round(CLOCK_HZ * min(4.0, protocol.standstill / 2.0)))
-        welch.process(signals[name][round(protocol.warm_up * CLOCK_HZ) :])
+        welch = WelchDensity(BASE_RATE_HZ, round(BASE_RATE_HZ * min(4.0, protocol.standstill / 2.0)))
+        welch.process(signals[name][round(protocol.warm_up * BASE_RATE_HZ) :])
         freq = welch.freq_hz[2:]  # what is below is the window's own leakage
         columns.append(welch.density[2:])
     columns.append(columns[1] / np.abs(mhd_response(freq)) ** 2)
@@ -242,7 +244,7 @@ def noise_density(seed: int, protocol: Protocol, **parameters: Any) -> tuple[Flo
     return binned[0][0], np.array([density for _, density in binned]).T
 
 
-def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters: Any) -> Iterator[str]:
+def report(seeds: int, out: Path, protocol: BenchProtocol | None = None, **parameters: Any) -> Iterator[str]:
     """Run the whole protocol, write scale_factor.csv, linearity.csv and noise_psd.csv, and yield the tables line by
     line.
 
@@ -252,7 +254,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters
         Seeds 1 to this; every entry is the median over them [-].
     out : Path
         Folder to write to.
-    protocol : Protocol, optional
+    protocol : BenchProtocol, optional
         The paper's if not given.
     **parameters : Any
         Of the filter.
@@ -262,7 +264,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters
     str
         One line.
     """
-    protocol = protocol or Protocol()
+    protocol = protocol or BenchProtocol()
     run = range(1, seeds + 1)
     scale = np.median([scale_factor(seed, protocol, **parameters) for seed in run], axis=0)
     yield from _table(
@@ -285,7 +287,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None, **parameters
 
 
 def _claims(
-    protocol: Protocol, scale: FloatArray, linear: FloatArray, freq: FloatArray, density: FloatArray
+    protocol: BenchProtocol, scale: FloatArray, linear: FloatArray, freq: FloatArray, density: FloatArray
 ) -> Iterator[str]:
     low = scale[np.array(protocol.scale_frequencies) < 1.0]
     half = 50.0 * np.ptp(low) / np.mean(low)

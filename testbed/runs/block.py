@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from testbed.fusion import EstimateBlock
+    from testbed.fusion.base import EstimateBlock
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.turntable import TruthBlock
     from testbed.signals import FloatArray

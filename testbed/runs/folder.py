@@ -11,20 +11,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import h5py
 from ruamel.yaml import YAML
 
 from testbed.errors import Problem, RunError, ScenarioError
 from testbed.runs.atomic import put, sync_tree, write_text
 from testbed.runs.leftovers import beside, heal
 from testbed.runs.manifest import MANIFEST, read_manifest, strangers, write_manifest
-from testbed.runs.results import Run, Signals, assemble
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from typing import Self
 
-    from testbed.signals import FloatArray
 
 ESSENTIAL = ("scenario.yaml", "run.nc", "metrics.json")
 
@@ -148,53 +145,3 @@ def failing_as_run_error(what: str) -> Iterator[Callable[[float], None]]:
         far = "" if reached is None else f"; the run got as far as t = {reached:g} s"
         msg = f"{what} could not be written: {reason}{far}"
         raise RunError(msg) from error
-
-
-def open_run(folder: str | Path) -> Run:
-    """Open a run folder; its signals are read when they are asked for.
-
-    Parameters
-    ----------
-    folder : str or Path
-        A run folder.
-
-    Raises
-    ------
-    ScenarioError
-        If it is no run folder.
-    """
-    path = Path(folder)
-    heal(path)
-    missing = [name for name in ESSENTIAL if not (path / name).is_file()]
-    if missing:
-        msg = f"expected a run folder, but {', '.join(missing)} is missing"
-        raise ScenarioError([Problem(msg, file=str(folder))])
-    metrics = json.loads((path / "metrics.json").read_text(encoding="utf-8"))
-    return assemble(dict(_groups(path / "run.nc")), metrics, path)
-
-
-def _groups(path: Path) -> Iterator[tuple[str, Signals]]:
-    found: list[tuple[str, tuple[str, ...]]] = []
-
-    def visit(name: str, node: Any) -> None:
-        if isinstance(node, h5py.Group):
-            names = tuple(key for key, item in node.items() if isinstance(item, h5py.Dataset))
-            if names:
-                found.append((name, names))
-
-    try:
-        with h5py.File(path) as file:
-            file.visititems(visit)
-    except OSError as error:
-        raise ScenarioError([Problem(f"is no readable run: {error}", file=str(path))]) from error
-    for group, names in found:
-        yield group, Signals(names, _reader(path, group))
-
-
-def _reader(path: Path, group: str) -> Any:
-    def read(name: str) -> FloatArray:
-        with h5py.File(path) as file:
-            values: FloatArray = file[f"{group}/{name}"][:]
-        return values
-
-    return read

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import h5netcdf
 import numpy as np
 
-from testbed.fusion.base import diagnostic_unit
+from testbed.runs.attributes import attributes, is_precise
 from testbed.runs.block import columns
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from testbed.runs.block import RunBlock
 
 _CHUNK = 20_000
-_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s", "temperature": "K"}
 
 
 class _ShieldedFile(io.FileIO):
@@ -103,13 +102,12 @@ class NetcdfStore:
         node = self._group(group)
         if "time" not in node.variables:
             node.dimensions["time"] = n
-            time = self._variable(node, "time", n, np.float64)
+            time = self._variable(node, group, "time", n)
             for start in range(0, n, _CHUNK):
                 stop = min(start + _CHUNK, n)
                 time[start:stop] = np.arange(start, stop) / rate
             node.attrs["sample_rate_hz"] = rate
-        precise = name in _UNITS or is_sensor_truth(name)
-        self._variables[group, name] = self._variable(node, name, n, np.float64 if precise else np.float32)
+        self._variables[group, name] = self._variable(node, group, name, n)
 
     def _group(self, path: str) -> Any:
         node = self._file
@@ -117,30 +115,17 @@ class NetcdfStore:
             node = node.groups[name] if name in node.groups else node.create_group(name)
         return node
 
-    def _variable(self, node: Any, name: str, n: int, kind: type) -> Any:
+    def _variable(self, node: Any, group: str, name: str, n: int) -> Any:
         variable = node.create_variable(
             name,
             ("time",),
-            kind,
+            np.float64 if is_precise(name) else np.float32,
             chunks=(min(_CHUNK, n),),
             compression="gzip",
             compression_opts=1,
             shuffle=True,
             fillvalue=np.nan,
         )
-        variable.attrs["units"] = unit_of(name)
+        for key, value in attributes(group, name).items():
+            variable.attrs[key] = value
         return variable
-
-
-def unit_of(name: str) -> str:
-    """Return the SI unit of a signal by its name."""
-    if name in _UNITS:
-        return _UNITS[name]
-    return _UNITS["rate"] if is_sensor_truth(name) else diagnostic_unit(name)
-
-
-def is_sensor_truth(name: str) -> bool:
-    """Return whether a signal is what a sensor's axis feels, named ``<sensor>_rate``, or its thermal bias,
-    ``<sensor>_drift``.
-    """
-    return name.endswith(("_rate", "_drift")) and name != "Q_rate"

@@ -3,67 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from testbed.errors import Problem, ScenarioError
+from testbed.runs.attributes import unit_of
 from testbed.runs.block import columns
+from testbed.runs.folder import ESSENTIAL
+from testbed.runs.leftovers import heal
+from testbed.runs.metrics import RunMetrics, read_metrics
+from testbed.runs.reading import read_groups
+from testbed.runs.signals import Signals, kept
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
+    from collections.abc import Mapping
 
     from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
 
 
-class Signals:
-    """Signals of one group as attributes and items: ``group.rate``, ``group["rate"]``, ``group.time``.
-
-    Each is a NumPy array; of a run on disk it is read when it is asked for.
-
-    Parameters
-    ----------
-    names : tuple of str
-        What there is.
-    read : callable
-        Name -> array.
-    """
-
-    def __init__(self, names: tuple[str, ...], read: Callable[[str], FloatArray]) -> None:
-        self._names = names
-        self._read = read
-
-    def __getitem__(self, name: str) -> FloatArray:
-        if name not in self._names:
-            raise KeyError(name)
-        return self._read(name)
-
-    def __getattr__(self, name: str) -> FloatArray:
-        if name.startswith("_") or name not in self._names:
-            msg = f"no signal {name!r} (there are {', '.join(self._names)})"
-            raise AttributeError(msg)
-        return self._read(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._names]
-
-    def __repr__(self) -> str:
-        return f"Signals({', '.join(self._names)})"
-
-
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class RunRecord:
     """A finished run: signals in SI and metrics.
 
     `commanded` and `truth` are on the base clock, each sensor of `sensors` on its own, each filter of `fusion` on that
-    of its fastest sensor. `metrics` is the content of metrics.json; `folder` is where the run is stored, None if it is
+    of its fastest sensor. `metrics` is what metrics.json holds; `folder` is where the run is stored, None if it is
     in memory only.
     """
 
@@ -71,8 +37,62 @@ class Run:
     truth: Signals
     sensors: Mapping[str, Signals]
     fusion: Mapping[str, Signals]
-    metrics: dict[str, Any]
+    metrics: RunMetrics
     folder: Path | None = None
+
+    @classmethod
+    def of(cls, groups: Mapping[str, Signals], metrics: RunMetrics, folder: Path | None = None) -> Self:
+        """Return the run made of `groups` named as in run.nc."""
+
+        def below(prefix: str) -> dict[str, Signals]:
+            return {
+                group.removeprefix(prefix): signals for group, signals in groups.items() if group.startswith(prefix)
+            }
+
+        return cls(groups["commanded"], groups["truth"], below("sensors/"), below("fusion/"), metrics, folder)
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Self:
+        """Open a run folder; its signals are read when they are asked for.
+
+        Parameters
+        ----------
+        folder : str or Path
+            A run folder.
+
+        Raises
+        ------
+        ScenarioError
+            If it is no run folder, or a file in it is damaged.
+        """
+        path = Path(folder).absolute()
+        heal(path)
+        missing = [name for name in ESSENTIAL if not (path / name).is_file()]
+        if missing:
+            problem = f"expected a run folder, but {', '.join(str(Path(folder) / name) for name in missing)} is missing"
+            raise ScenarioError([Problem(problem, file=str(folder))])
+        metrics, groups = read_metrics(path / "metrics.json"), read_groups(path / "run.nc")
+        for group in ("commanded", "truth"):
+            if group not in groups:
+                raise ScenarioError([Problem("expected this group, got none", group, str(path / "run.nc"))])
+        return cls.of(groups, metrics, path)
+
+    @property
+    def groups(self) -> dict[str, Signals]:
+        """Every group of signals by its path in run.nc, such as ``fusion/kalman``."""
+        return {
+            "commanded": self.commanded,
+            "truth": self.truth,
+            **{f"sensors/{name}": signals for name, signals in self.sensors.items()},
+            **{f"fusion/{name}": signals for name, signals in self.fusion.items()},
+        }
+
+    def __repr__(self) -> str:
+        known = {name: source.rmse_deg_s for name, source in self.metrics.fusion.items()}
+        errors = [f"{name} {'undefined' if rmse is None else f'{rmse:.4g} deg/s'}" for name, rmse in known.items()]
+        place = [] if self.folder is None else [str(self.folder)]
+        head = f"{self.metrics.scenario}, {self.metrics.duration_s:g} s, seed {self.metrics.seed}"
+        return f"<Run {'; '.join([head, *([', '.join(errors)] if errors else []), *place])}>"
 
 
 class MemoryStore:
@@ -101,16 +121,4 @@ class MemoryStore:
 
     def _signals(self, group: str) -> Signals:
         arrays = {name: np.concatenate(parts) for name, parts in self._parts[group].items()}
-        arrays = {"time": np.arange(next(iter(arrays.values())).size) / self._rate_of[group], **arrays}
-        for array in arrays.values():
-            array.flags.writeable = False
-        return Signals(tuple(arrays), arrays.__getitem__)
-
-
-def assemble(groups: Mapping[str, Signals], metrics: dict[str, Any], folder: Path | None = None) -> Run:
-    """Return the run made of `groups` named as in run.nc."""
-
-    def below(prefix: str) -> dict[str, Signals]:
-        return {group.removeprefix(prefix): signals for group, signals in groups.items() if group.startswith(prefix)}
-
-    return Run(groups["commanded"], groups["truth"], below("sensors/"), below("fusion/"), metrics, folder)
+        return kept(arrays, {name: unit_of(name) for name in arrays}, self._rate_of[group])

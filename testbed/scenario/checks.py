@@ -6,17 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.errors import ScenarioError
+from testbed.errors import RunError, ScenarioError
+from testbed.inputs.plugins import PluginError, running
+from testbed.models.turntable.floor import Floor
+from testbed.models.turntable.modal import check_modal
 from testbed.models.turntable.servo import required_torque
-from testbed.models.turntable.turntable import check_plant
+from testbed.models.turntable.turntable import Turntable, check_plant
 from testbed.scenario.model import METRICS
-from testbed.scenario.step_choice import given_step
+from testbed.scenario.step_choice import excerpt, exposed, given_step
+from testbed.sensors import SENSORS
+from testbed.sensors.checked import try_sensor
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from testbed.document import Document
     from testbed.scenario.model import Scenario
-
-_BLOCK = 20_000
 
 
 def cross_check(scenario: Scenario, document: Document) -> None:
@@ -25,6 +29,7 @@ def cross_check(scenario: Scenario, document: Document) -> None:
     _check_clocks(scenario, document)
     _check_expectations(scenario, document)
     _check_plant(scenario, document)
+    _check_foreign_sensors(scenario, document)
     _check_filters(scenario, document)
     if not document.problems:
         _check_motion(scenario, document)
@@ -82,6 +87,15 @@ def _check_plant(scenario: Scenario, document: Document) -> None:
         check_plant(parameters, scenario.base_rate_hz, step.substeps, step.holds)
     except ScenarioError as error:
         document.find(("turntable",), _reasons(error))
+        return
+    if parameters.engine == "modal":
+        try:
+            check_modal(parameters, exposed(scenario))
+            # Whether its modes can be told apart shows when they are computed; its disturbances do not change them.
+            still = parameters.model_copy(update={"floor": Floor(), "wobble": ()})
+            Turntable(still, {}, scenario.base_rate_hz, modal=True).process(excerpt(scenario).process(1))
+        except ScenarioError as error:
+            document.find(("turntable", "engine"), _reasons(error))
 
 
 def _reasons(error: ScenarioError) -> str:
@@ -99,13 +113,25 @@ def _check_expectations(scenario: Scenario, document: Document) -> None:
             document.find(("expect", bound.subject, bound.metric), f"is no metric (known: {', '.join(METRICS)})")
 
 
+def _check_foreign_sensors(scenario: Scenario, document: Document) -> None:
+    """Try the sensors of plug-ins, whose faults would else show in the middle of a run."""
+    if document.problems:
+        return
+    for name, sensor in scenario.sensors.items():
+        if scenario.sensor_types[name] not in SENSORS:
+            try:
+                try_sensor(sensor, scenario.base_rate_hz)
+            except PluginError as error:
+                document.find(("sensors", name), str(error))
+
+
 def _check_filters(scenario: Scenario, document: Document) -> None:
     if document.problems:
         return
     rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
     for name, spec in scenario.fusion.items():
         try:
-            spec.factory(spec.belief, rates, spec.parameters)
+            spec.start(rates)
         except (ValueError, TypeError) as error:
             document.find(("fusion", name), f"{spec.type}: {error}")
 
@@ -113,9 +139,13 @@ def _check_filters(scenario: Scenario, document: Document) -> None:
 def _check_motion(scenario: Scenario, document: Document) -> None:
     for i, (kind, motion) in enumerate(scenario.motion):
         try:
-            top = motion.top_frequency()
+            with running(f"motion {kind}"):
+                top = float(motion.top_frequency())
         except ScenarioError as error:
             document.adopt(error)
+            continue
+        except PluginError as error:
+            document.find(("motion", i, kind), str(error))
             continue
         for name, sensor in scenario.sensors.items():
             if top >= sensor.sample_rate / 2:
@@ -134,6 +164,9 @@ def _check_reach(scenario: Scenario, document: Document) -> None:
         peak_rate, peak_torque = command_peaks(scenario)
     except ScenarioError as error:
         document.adopt(error)
+        return
+    except RunError as error:
+        document.find(("motion",), str(error))
         return
     for name, sensor in scenario.sensors.items():
         if peak_rate > sensor.full_scale():
@@ -155,8 +188,8 @@ def command_peaks(scenario: Scenario) -> tuple[float, float]:
     """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
     motion = scenario.profile()
     peak_rate = peak_torque = 0.0
-    for start in range(0, scenario.n_time, _BLOCK):
-        command = motion.process(min(_BLOCK, scenario.n_time - start))
+    for start in range(0, scenario.n_time, BLOCK):
+        command = motion.process(min(BLOCK, scenario.n_time - start))
         torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
         peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
         peak_torque = max(peak_torque, float(np.max(np.abs(torque))))

@@ -3,36 +3,46 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, unknown_key
-from testbed.errors import UnknownNameError, quoted
-from testbed.fusion import FILTERS
-from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.errors import ScenarioError, UnknownNameError, quoted
+from testbed.inputs.plugins import Plugins, load_plugins
+from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
-from testbed.models.turntable.turntable import TurntableParameters
-from testbed.parts import merge, preset, resolve
+from testbed.models.turntable.parameters import TurntableParameters
+from testbed.parts import merge, preset
+from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
-from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
+from testbed.scenario.entries import is_name, kind_of, mapping
+from testbed.scenario.fusion import Fusion
+from testbed.scenario.intake import Intake, unresolved
+from testbed.scenario.model import Bound, Frame, Scenario
 from testbed.sensors import SENSORS
+from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable
 
-    from testbed.models.motion import Motion
-    from testbed.sensors.base import Sensor
+    from testbed.fusion.belief import SensorBelief
 
 _BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
 
 
-def load_scenario(path: str | Path) -> Scenario:
+def load_scenario(path: str | Path, *, plugins: Iterable[str] = (), allow_outside: bool = False) -> Scenario:
     """Read and validate a scenario.
 
     Parameters
     ----------
     path : str or Path
         A YAML 1.2 file; every dimensional value is a string with its unit.
+    plugins : iterable of str, optional
+        Modules, dotted or as paths of ``.py`` files, that are loaded first and whose classes the scenario may name as
+        ``module:Class``; those of the environment variable ``TESTBED_PLUGINS`` besides.
+    allow_outside : bool, optional
+        Whether a recorded motion may lie outside the scenario's folder.
 
     Returns
     -------
@@ -43,52 +53,139 @@ def load_scenario(path: str | Path) -> Scenario:
     ------
     ScenarioError
         With every finding at once: file, line, key and what was expected.
+
+    Examples
+    --------
+    >>> load_scenario("no.yaml")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: no.yaml: cannot be read: No such file or directory
+    """
+    loaded = load_plugins(plugins)
+    return read_document(Intake(Document(Path(path)), Path(path).resolve().parent, loaded, allow_outside))
+
+
+def as_scenario(given: object) -> Scenario:
+    """Return a scenario as it is, or read it from its file or from a mapping.
+
+    Parameters
+    ----------
+    given : Scenario, str, Path or mapping
+        Which; relative paths of a mapping begin in the working folder.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no valid scenario.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if isinstance(given, str | Path):
+        return load_scenario(given)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given)
+    msg = f"expected a scenario, its file or a mapping of its keys, got {quoted(given)}"
+    raise ScenarioError(msg)
+
+
+def read_document(intake: Intake) -> Scenario:
+    """Validate the content of a document as a scenario.
+
+    Parameters
+    ----------
+    intake : Intake
+        The document, of a file or of a mapping built in Python, and the terms on which it is read.
+
+    Raises
+    ------
+    ScenarioError
+        With every finding at once.
+    """
+    scenario = _Reader(intake).scenario()
+    intake.document.refuse()
+    assert scenario is not None
+    cross_check(scenario, intake.document)
+    intake.document.refuse()
+    return scenario
+
+
+def load_instruments(path: str | Path) -> Scenario:
+    """Read what a finished run's scenario says of frame, table and sensors; no plug-in is loaded.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``scenario.yaml`` of a run folder.
+
+    Returns
+    -------
+    Scenario
+        Without motion, filters, expectations and the sensors of plug-ins.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_scenario`.
     """
     document = Document(Path(path))
-    reader = _Reader(document, Path(path).resolve().parent)
-    scenario = reader.scenario()
+    scenario = _Reader(Intake(document, Path(path).resolve().parent, Plugins())).instruments()
     document.refuse()
     assert scenario is not None
-    cross_check(scenario, document)
-    document.refuse()
     return scenario
 
 
 class _Reader:
     """Takes a document apart, part by part, so that every part's errors are found."""
 
-    def __init__(self, document: Document, folder: Path) -> None:
-        self._doc = document
-        self._folder = folder
+    def __init__(self, intake: Intake) -> None:
+        self._intake, self._doc = intake, intake.document
         self._presets: dict[str, Any] = {"sensors": {}}
+        self._data_sheets: dict[str, SensorBelief | None] = {}
 
     def scenario(self) -> Scenario | None:
-        data = dict(self._doc.data)
+        """Return the whole scenario; None if something is wrong, which the document knows."""
+        return self._joined(dict(self._doc.data))
+
+    def instruments(self) -> Scenario | None:
+        """Return the scenario without what reading its results does not need."""
+        sensors = mapping(self._doc, self._doc.data.get("sensors"), ("sensors",))
+        kept = {key: value for key, value in self._doc.data.items() if key not in {"fusion", "expect"}}
+        shipped = {
+            name: entry
+            for name, entry in sensors.items()
+            if not isinstance(entry, dict) or str(entry.get("type", name)) in SENSORS
+        }
+        return self._joined({**kept, "sensors": shipped, "motion": [{"static": {}}]})
+
+    def _joined(self, data: dict[str, Any]) -> Scenario | None:
         parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "expect")}
         for key in [key for key in data if key not in Frame.model_fields]:
             self._doc.find((key,), unknown_key(str(key), [*Frame.model_fields, *parts]))
             del data[key]
-        frame = self._doc.validate(Frame, data, (), self._folder)
+        frame = self._intake.validate(Frame, data, ())
         turntable = self._turntable(parts["turntable"])
         motion = self._motion(parts["motion"])
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = self._fusion(parts["fusion"], types)
+        fusion = Fusion(self._intake, sensors, types, self._data_sheets).read(parts["fusion"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
         return Scenario(
-            frame, turntable, motion, sensors, types, fusion, expect, self._doc.file, self._doc.data, self._presets
+            frame,
+            turntable,
+            motion,
+            sensors,
+            types,
+            fusion,
+            expect,
+            self._doc.file,
+            self._intake.folder,
+            self._doc.data,
+            self._presets,
+            self._intake.plugins.used,
+            self._intake.allow_outside,
         )
-
-    def _mapping(self, data: Any, key: tuple[str | int, ...]) -> dict[str, Any]:
-        if data is None:
-            return {}
-        if not isinstance(data, dict):
-            self._doc.find(key, f"expected a mapping, got {quoted(data)}")
-            return {}
-        return data
 
     def _with_preset(
         self, data: dict[str, Any], package: str, key: tuple[str | int, ...], default: str | None = None
@@ -106,9 +203,9 @@ class _Reader:
 
     def _turntable(self, data: Any) -> TurntableParameters | None:
         key = ("turntable",)
-        merged = self._with_preset(self._mapping(data, key), "testbed.models", key, "air_bearing")
+        merged = self._with_preset(mapping(self._doc, data, key), "testbed.models", key, "air_bearing")
         self._presets["turntable"] = merged or {}
-        return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
+        return None if merged is None else self._intake.validate(TurntableParameters, merged, key)
 
     def _motion(self, data: Any) -> tuple[tuple[str, Motion], ...]:
         if not isinstance(data, list) or not data:
@@ -126,116 +223,46 @@ class _Reader:
             return None
         kind, parameters = next(iter(item.items()))
         try:
-            model = resolve("motion", str(kind), MOTIONS)
+            model = self._intake.resolve("motion", str(kind), MOTIONS, Motion)
         except UnknownNameError as error:
             self._doc.find((*key, kind), str(error))
             return None
-        motion = self._doc.validate(model, self._mapping(parameters, (*key, kind)), (*key, kind), self._folder)
+        given = mapping(self._doc, parameters, (*key, kind))
+        motion = self._intake.validate(model, given, (*key, kind), shipped=kind in MOTIONS)
         return None if motion is None else (str(kind), motion)
 
     def _sensors(self, data: Any) -> tuple[dict[str, Sensor], dict[str, str]]:
         sensors: dict[str, Sensor] = {}
         types: dict[str, str] = {}
-        for name, entry in self._mapping(data, ("sensors",)).items():
+        for name, entry in mapping(self._doc, data, ("sensors",)).items():
             key = ("sensors", name)
-            merged = (
-                self._with_preset(self._mapping(entry, key), "testbed.sensors", key)
-                if self._good_name(name, key)
-                else None
-            )
-            if merged is None:
+            given = mapping(self._doc, entry, key) if is_name(self._doc, name, key) else None
+            merged = None if given is None else self._with_preset(given, "testbed.sensors", key)
+            if given is None or merged is None:
                 continue
+            if "belief" in merged and "belief" not in given:
+                # What the preset's data sheet supports; it is no parameter of the sensor.
+                del merged["belief"]
+                self._data_sheets[name] = preset_belief(str(given["preset"]))
             self._presets["sensors"][name] = dict(merged)
-            kind = self._type(merged.pop("type", name), key)
+            kind = kind_of(self._doc, merged.pop("type", name), key)
             if kind is None:
                 continue
             types[name] = kind
             try:
-                model = resolve("sensor", kind, SENSORS)
+                model = self._intake.resolve("sensor", kind, SENSORS, Sensor)
             except UnknownNameError as error:
-                self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+                self._doc.find((*key, "type"), unresolved(error, kind))
                 continue
-            sensor = self._doc.validate(model, merged, key, self._folder)
+            sensor = self._intake.validate(model, merged, key, shipped=kind in SENSORS)
             if sensor is not None:
                 sensors[name] = sensor
         return sensors, types
 
-    def _fusion(self, data: Any, types: Mapping[str, str]) -> dict[str, FilterSpec]:
-        specs = {}
-        for name, entry in self._mapping(data, ("fusion",)).items():
-            key = ("fusion", name)
-            if self._good_name(name, key):
-                spec = self._filter(name, dict(self._mapping(entry, key)), types, key)
-                if spec is not None:
-                    specs[name] = spec
-        return specs
-
-    def _filter(
-        self, name: str, entry: dict[str, Any], types: Mapping[str, str], key: tuple[str | int, ...]
-    ) -> FilterSpec | None:
-        kind = self._type(entry.pop("type", name), key)
-        believed = entry.pop("belief", "eq39")
-        if kind is None:
-            return None
-        try:
-            factory = resolve("filter", kind, FILTERS)
-            belief = self._belief(believed, types, key)
-        except UnknownNameError as error:
-            self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
-            return None
-        model = getattr(factory, "Parameters", None)
-        parameters = entry if model is None else self._doc.validate(model, entry, key, self._folder)
-        if parameters is None or belief is None:
-            return None
-        return FilterSpec(kind, factory, parameters, belief, believed)
-
-    def _belief(
-        self, believed: Any, types: Mapping[str, str], key: tuple[str | int, ...]
-    ) -> Mapping[str, SensorBelief] | None:
-        """Return what the filter believes of each sensor: by the sensor's name, or else by its type."""
-        known = self._known_belief(believed, (*key, "belief"))
-        if known is None:
-            return None
-        belief = {}
-        for name, kind in types.items():
-            entry = known.get(name, known.get(kind))
-            if entry is None:
-                self._doc.find(
-                    (*key, "belief"), f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                )
-                return None
-            belief[name] = entry
-        return belief
-
-    def _known_belief(self, believed: Any, key: tuple[str | int, ...]) -> Mapping[str, SensorBelief] | None:
-        """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
-        if isinstance(believed, str):
-            try:
-                return load_belief(believed)
-            except UnknownNameError as error:
-                self._doc.find(key, str(error))
-                return None
-        if not isinstance(believed, dict):
-            self._doc.find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(believed)}")
-            return None
-        read = {
-            str(name): self._doc.validate(SensorBelief, value, (*key, name), self._folder)
-            for name, value in believed.items()
-        }
-        known = {name: one for name, one in read.items() if one is not None}
-        return known if len(known) == len(read) else None
-
-    def _type(self, given: Any, key: tuple[str | int, ...]) -> str | None:
-        """Return the name of a part's kind; None, with the finding noted, if it is no name."""
-        if isinstance(given, str):
-            return given
-        self._doc.find((*key, "type"), f"expected a name, got {quoted(given)}")
-        return None
-
     def _expect(self, data: Any) -> tuple[Bound, ...]:
         bounds = []
-        for subject, metrics in self._mapping(data, ("expect",)).items():
-            for metric, text in self._mapping(metrics, ("expect", subject)).items():
+        for subject, metrics in mapping(self._doc, data, ("expect",)).items():
+            for metric, text in mapping(self._doc, metrics, ("expect", subject)).items():
                 match = _BOUND.fullmatch(text) if isinstance(text, str) else None
                 try:
                     bounds.append(Bound(str(subject), str(metric), *_relation(match)))
@@ -244,12 +271,6 @@ class _Reader:
                         ("expect", subject, metric), f"expected a bound such as '< 0.0143', got {quoted(text)}"
                     )
         return tuple(bounds)
-
-    def _good_name(self, name: Any, key: tuple[str | int, ...]) -> bool:
-        if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
-            return True
-        self._doc.find(key, f"expected a name of letters, digits and underscores, got {quoted(name)}")
-        return False
 
 
 def at_temperature(sensor: Sensor, temperature: float) -> Sensor:

@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
-from testbed.models.motion import MotionProfile
+from testbed.document import Document
+from testbed.fusion import FILTERS
+from testbed.fusion.belief import declared
+from testbed.inputs.plain import plain_tree
+from testbed.inputs.plugins import Plugins, load_plugins, running
+from testbed.models.motion import MotionProfile, watched
+from testbed.models.motions import MOTIONS
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
+from testbed.scenario.edits import edited
 from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Mapping
 
     from testbed.fusion.belief import SensorBelief
+    from testbed.inputs.plugins import Plugin
+    from testbed.inputs.tree import Tree
     from testbed.models.motion import Motion
-    from testbed.models.turntable.turntable import TurntableParameters
+    from testbed.models.turntable.floor import FloorMotion
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
+# What the signed 64 bits of run.nc hold.
+MOST_SEED = 2**63 - 1
+
+
+Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 
 
 class Frame(Part):
@@ -37,6 +54,9 @@ class Frame(Part):
         What the experiment shows.
     seed : int, optional
         Seed of every random stream.
+    truth_seed : int, optional
+        Seed of what the table really does, random motions and floor, instead of `seed`: then `seed` varies the noise of
+        the sensors alone.
     duration : float
         Length of the run [s].
     settle : float, optional
@@ -54,7 +74,8 @@ class Frame(Part):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
     description: str = ""
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Seed = 0
+    truth_seed: Seed | None = None
     duration: PositiveDuration
     settle: Duration = 0.0
     ramp_in: Duration = 0.5
@@ -101,15 +122,40 @@ class FilterSpec:
     factory: Callable[..., Any]
     parameters: Any
     belief: Mapping[str, SensorBelief]
-    belief_name: Any
+
+    def start(self, sample_rate_hz: Mapping[str, float]) -> Any:
+        """Return the filter at its beginning.
+
+        Parameters
+        ----------
+        sample_rate_hz : mapping of str to float
+            Rate of each sensor [Hz].
+
+        Raises
+        ------
+        ValueError
+            If belief, rates and parameters do not fit together; PluginError for whatever a plug-in raises.
+        """
+        if self.type in FILTERS:
+            return self.factory(self.belief, sample_rate_hz, self.parameters)
+        # Copies: a plug-in may keep and change what it gets.
+        with running(f"plug-in {self.type}"):
+            return self.factory(dict(self.belief), dict(sample_rate_hz), deepcopy(self.parameters))
 
 
 @dataclass(frozen=True)
 class Scenario:
     """A validated scenario in SI.
 
-    `source` is the mapping as written in the file, with the user's units, and `presets` holds the parts that presets
-    filled in; `file` is where it stands.
+    `source` is the mapping as written, with the user's units, and `presets` holds the parts that presets filled in;
+    `file` is where it stands, nothing if it was built in Python, and `folder` where relative paths begin, outside of
+    which a recorded motion may lie only with `allow_outside`; `plugins` are those that were loaded for it.
+
+    Examples
+    --------
+    >>> scenario = Scenario.from_dict({"name": "still", "duration": "2 s", "motion": [{"static": {}}]})
+    >>> scenario.with_(duration="5 s", **{"motion.0": {"sine": {"frequency": "4 Hz", "rate": "1 deg/s"}}}).lines
+    (4.0,)
     """
 
     frame: Frame
@@ -120,8 +166,27 @@ class Scenario:
     fusion: Mapping[str, FilterSpec]
     expect: tuple[Bound, ...]
     file: str
+    folder: Path
     source: Mapping[str, Any] = field(repr=False)
     presets: Mapping[str, Any] = field(repr=False)
+    plugins: tuple[Plugin, ...] = ()
+    allow_outside: bool = False
+
+    @property
+    def truth_seed(self) -> int:
+        """Seed of the random streams of the truth."""
+        return self.frame.seed if self.frame.truth_seed is None else self.frame.truth_seed
+
+    def floor(self, duration: float | None = None) -> FloorMotion:
+        """Return how the floor of the run moves.
+
+        Parameters
+        ----------
+        duration : float, optional
+            Length of the realisation instead of the run's [s].
+        """
+        stream = partial(random_stream, self.truth_seed, "turntable", "floor")
+        return self.turntable.floor.start(self.frame.duration if duration is None else duration, stream)
 
     @property
     def name(self) -> str:
@@ -162,16 +227,73 @@ class Scenario:
         ramp_in : float, optional
             Length of the ramp-in instead of the scenario's [s].
         """
-        seed, duration = self.frame.seed, self.frame.duration
-        terms = [
-            motion.start(duration, random_stream(seed, "motion", str(i), kind))
-            for i, (kind, motion) in enumerate(self.motion)
-        ]
+        duration = self.frame.duration
+        terms = []
+        for i, (kind, motion) in enumerate(self.motion):
+            stream = random_stream(self.truth_seed, "motion", str(i), kind)
+            terms.append(motion.start(duration, stream) if kind in MOTIONS else watched(kind, motion, duration, stream))
         return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
 
+    @classmethod
+    def from_dict(
+        cls,
+        mapping: Mapping[str, Any],
+        folder: str | Path = ".",
+        *,
+        plugins: Iterable[str] = (),
+        allow_outside: bool = False,
+    ) -> Scenario:
+        """Return the scenario that a mapping describes, validated as a file is.
+
+        Parameters
+        ----------
+        mapping : mapping
+            The keys of a scenario file; every dimensional value is a string with its unit.
+        folder : str or Path, optional
+            Where relative paths in it begin.
+        plugins, allow_outside : iterable of str, bool, optional
+            As for `load_scenario`.
+
+        Raises
+        ------
+        ScenarioError
+            With every finding at once: key and what was expected.
+        """
+        return _built(plain_tree(mapping), Path(folder), "", load_plugins(plugins), allow_outside=allow_outside)
+
+    def with_(self, **changes: Any) -> Scenario:
+        """Return the scenario with other values, validated as a whole.
+
+        Parameters
+        ----------
+        **changes : Any
+            What shall stand at a key, in units as in a file: ``duration="5 s"``, and by dotted keys
+            ``**{"sensors.mems_gyro.range": "300 deg/s", "motion.0.sine.frequency": "4 Hz"}``. None removes the key; a
+            mapping or a list replaces what stood there.
+
+        Raises
+        ------
+        ScenarioError
+            With every finding at once: key and what was expected; also for a key or an index that is not there.
+        """
+        tree, loaded = plain_tree(edited(self.source, changes, self.file)), Plugins(self.plugins)
+        return _built(tree, self.folder, self.file, loaded, allow_outside=self.allow_outside)
+
     def with_seed(self, seed: int) -> Scenario:
-        """Return the same scenario under another seed."""
-        return replace(self, frame=self.frame.model_copy(update={"seed": seed}))
+        """Return the same scenario under another seed; quick, since nothing else is validated again.
+
+        Parameters
+        ----------
+        seed : int
+            At least 0.
+
+        Raises
+        ------
+        ScenarioError
+            If it is no such number.
+        """
+        frame = self.frame.model_copy(update=plain_tree({"seed": seed}).data)
+        return replace(self, frame=frame, source={**self.source, "seed": frame.seed})
 
     def kept_in(self, folder: Path) -> Scenario:
         """Return the same scenario with the files that its motion reads copied to `folder`: it needs no others."""
@@ -194,11 +316,18 @@ class Scenario:
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
             "fusion": {
-                name: {"type": spec.type, "belief": {k: dump(b) for k, b in spec.belief.items()}, **_parameters(spec)}
+                name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
             "expect": _expectations(self.expect),
         }
+
+
+def _built(tree: Tree, folder: Path, file: str, plugins: Plugins, *, allow_outside: bool) -> Scenario:
+    from testbed.scenario.intake import Intake
+    from testbed.scenario.loader import read_document
+
+    return read_document(Intake(Document(file, tree=tree), folder.resolve(), plugins, allow_outside))
 
 
 def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
@@ -215,6 +344,12 @@ def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
     written = part.model_dump(mode="json", context={"border": True, "folder": folder})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def _belief(spec: FilterSpec) -> dict[str, Any] | str:
+    """Return what a filter believes; the exact belief as the word, since the sensors stand beside it."""
+    word = declared(spec.belief)
+    return word if word == "exact" else {name: dump(one) for name, one in spec.belief.items()}
 
 
 def _parameters(spec: FilterSpec) -> dict[str, Any]:

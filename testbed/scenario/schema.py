@@ -11,6 +11,11 @@ from testbed.parts import preset_names, resolve
 from testbed.scenario.model import Frame
 from testbed.sensors import SENSORS
 
+_BELIEF = (
+    "What the filter believes of the sensors: the name of a shipped belief, 'exact' for the simulator's own response "
+    "and noise, or a mapping; by default what the data sheets of the sensors' presets support"
+)
+
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a scenario file, for editors."""
@@ -31,7 +36,7 @@ def schema() -> dict[str, Any]:
         "motion": {
             "type": "array",
             "minItems": 1,
-            "items": {"oneOf": [_one_key(name, part(resolve("motion", name, MOTIONS))) for name in MOTIONS]},
+            "items": {"oneOf": [_motion(name, part) for name in MOTIONS]},
         },
         "sensors": {
             "type": "object",
@@ -68,7 +73,9 @@ def _optional(model: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in model.items() if key != "required"}
 
 
-def _one_key(name: str, model: dict[str, Any]) -> dict[str, Any]:
+def _motion(name: str, part: Any) -> dict[str, Any]:
+    kind = resolve("motion", name, MOTIONS)
+    model = {**part(kind), "examples": [kind.example]}
     return {"type": "object", "required": [name], "additionalProperties": False, "properties": {name: model}}
 
 
@@ -80,5 +87,5 @@ def _sensor(name: str, model: dict[str, Any]) -> dict[str, Any]:
 
 def _filter(name: str, part: Any) -> dict[str, Any]:
     model = _optional(part(resolve("filter", name, FILTERS).Parameters))
-    extra = {"type": {"type": "string"}, "belief": {"type": ["string", "object"]}}
+    extra = {"type": {"type": "string"}, "belief": {"type": ["string", "object"], "description": _BELIEF}}
     return {**model, "properties": {**model["properties"], **extra}}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from testbed.parts import preset, resolve
+from testbed.parts import preset, preset_names, resolve
 
 if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
@@ -33,8 +33,37 @@ def load_preset(name: str) -> Sensor:
     ------
     UnknownNameError
         If there is no such preset; the message gives the nearest name and the known ones.
+
+    Examples
+    --------
+    What an MHD sensor indicates of a true rate: little at 0.1 Hz, all of it at 100 Hz.
+
+    >>> abs(load_preset("sx300").response([0.1, 100.0])).round(2)
+    array([0.04, 1.01])
     """
     content = preset(__name__, name)
-    values = {key: value for key, value in content.items() if key != "type"}
+    values = {key: value for key, value in content.items() if key not in ("type", "belief")}
     model = resolve("sensor", content["type"], SENSORS)
     return cast("Sensor", model.model_validate(values, context={"border": True}))
+
+
+def list_sensors() -> list[str]:
+    """Return the types of sensor that a scenario may have.
+
+    Examples
+    --------
+    >>> "mhd_ars" in list_sensors()
+    True
+    """
+    return sorted(SENSORS)
+
+
+def list_presets() -> list[str]:
+    """Return the names of the shipped instruments, as `load_preset` takes them.
+
+    Examples
+    --------
+    >>> "sx300" in list_presets()
+    True
+    """
+    return preset_names(__name__)

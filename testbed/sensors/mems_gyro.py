@@ -11,7 +11,7 @@ from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rat
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
-from testbed.signals import LinearFilter, random_stream, transfer
+from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
 from testbed.units import Frequency, Quantity, Range
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
 
 # Base clock of a run, at which the noise enters.
-_INPUT_RATE_HZ = 20000.0
 
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
 Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
@@ -78,8 +77,8 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     def _young_enough(self) -> Self:
         if self.jitter > 1.0 / self.sample_rate:
             msg = (
-                f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, got "
-                f"{self.jitter!r} s"
+                f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, "
+                f"got {self.jitter!r} s"
             )
             raise ValueError(msg)
         return self
@@ -110,7 +109,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         freq = np.asarray(freq_hz, dtype=np.float64)
         numerator, denominator = self.transfer_function
         low_pass = transfer(np.array(numerator), np.array(denominator), freq)
-        clock = self.clock_response(freq, self.sample_rate, _INPUT_RATE_HZ)
+        clock = self.clock_response(freq, self.sample_rate, BASE_RATE_HZ)
         return (1.0 + self.scale_factor_error) * low_pass * clock
 
     def full_scale(self) -> float:
@@ -120,7 +119,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate, its terms at 20 kHz; see `Sensor.input_noise_psd`."""
         rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
-        terms = self.noise_psd(freq_hz, _INPUT_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
+        terms = self.noise_psd(freq_hz, BASE_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
 
@@ -129,7 +128,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         density, hour = np.rad2deg(self.angle_random_walk), np.rad2deg(3600.0)
         floor = (2.0 * np.log(2.0) / np.pi) ** 0.5
         allan = {tau: hour * self.allan_variance(tau) ** 0.5 for tau in (1.0, 100.0)}
-        delay = self.delay(self.sample_rate, _INPUT_RATE_HZ)
+        delay = self.delay(self.sample_rate, BASE_RATE_HZ)
         return [
             ("angle random walk N", f"{60.0 * density:.6g} deg/sqrt(h)"),
             ("N as root density, two-sided", f"{density:.6g} deg/s/sqrt(Hz)"),
@@ -154,10 +153,8 @@ class MemsGyroStage:
 
     def __init__(self, gyro: MemsGyro, input_rate_hz: float, seed: int, name: str) -> None:
         ratio = rate_ratio(input_rate_hz, gyro.sample_rate)
-        if isinstance(gyro.fir, tuple) and input_rate_hz != _INPUT_RATE_HZ:
-            msg = (
-                f"input_rate_hz: expected {_INPUT_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
-            )
+        if isinstance(gyro.fir, tuple) and input_rate_hz != BASE_RATE_HZ:
+            msg = f"input_rate_hz: expected {BASE_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
             raise ValueError(msg)
         self._gyro = gyro
 

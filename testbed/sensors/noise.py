@@ -157,7 +157,16 @@ class GyroTerms(Part):
 
 
 class GyroNoise(GyroTerms):
-    """The noise of a gyro by itself: `sample` for an array, `start` for a stream of blocks."""
+    """The noise of a gyro by itself: `sample` for an array, `start` for a stream of blocks.
+
+    Examples
+    --------
+    White noise of density N, sampled at interval T, has the standard deviation N / sqrt(T).
+
+    >>> rate = GyroNoise(angle_random_walk=1e-4).sample(10_000, 100.0, rng=1)
+    >>> round(float(rate.std()), 5)
+    0.001
+    """
 
     def start(self, sample_rate_hz: float, seed: int, *names: str) -> NoiseStage:
         """Return the noise in time.

@@ -100,6 +100,42 @@ def exact_curve(**true: float) -> AllanCurve:
 
 
 @pytest.mark.oracle
+@pytest.mark.parametrize("lose", ["single", "stretches"])
+def test_intervals_cover_the_truth_where_samples_are_lost(lose: str) -> None:
+    """White and flicker noise, 1 % of the samples lost at random or 5 % in two stretches: 95 % of 100 records."""
+    N, B, n_time, fs, runs = 4e-5, 1.3e-5, 10_000, 10.0, 100
+    inside = {"angle_random_walk": 0, "bias_instability": 0}
+    for seed in range(runs):
+        rate = GyroNoise(angle_random_walk=N, bias_instability=B).sample(n_time, fs, seed)
+        rng = np.random.default_rng(seed)
+        if lose == "single":
+            rate[rng.random(n_time) < 0.01] = np.nan
+        else:
+            for start in rng.integers(0, n_time - 250, 2):
+                rate[start : start + 250] = np.nan
+        fit = fit_allan(allan_deviation(rate, fs))
+        for name, true in (("angle_random_walk", N), ("bias_instability", B)):
+            found = getattr(fit, name)
+            inside[name] += found.lower <= true <= found.upper
+    # 99.9 % binomial band about 0.95 for 100 runs is 0.87 to 1.
+    assert min(inside.values()) >= 87, inside
+
+
+@pytest.mark.oracle
+def test_lost_samples_bias_the_curve_by_nothing() -> None:
+    """A tenth of white noise lost: the mean over 200 records is N^2 / tau to six of its standard deviations."""
+    curves = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        rate = rng.standard_normal(2000)
+        rate[rng.random(2000) < 0.1] = np.nan
+        curves.append(allan_deviation(rate, 1.0, [1, 3, 10, 30, 100]))
+    variance = np.array([curve.deviation**2 for curve in curves])
+    spread = variance.std(axis=0) / np.sqrt(len(curves))
+    assert np.all(np.abs(variance.mean(axis=0) - 1.0 / curves[0].tau) < 6.0 * spread)
+
+
+@pytest.mark.oracle
 def test_fit_recovers_the_coefficients_of_an_exact_curve() -> None:
     true = dict(zip(TERMS, (1e-4, 1e-4, 3e-5, 2e-6, 1e-7), strict=True))
     fit = fit_allan(exact_curve(**true))
@@ -286,7 +322,8 @@ def test_fit_scales_with_the_unit() -> None:
     [
         (np.zeros((2, 8)), 1.0, None, "rate: expected a vector"),
         (np.zeros(3), 1.0, None, "rate: expected a vector of at least 4"),
-        (np.array([0.0, 1.0, np.nan, 0.0]), 1.0, None, "got nan at sample 2"),
+        (np.array([0.0, 1.0, np.inf, 0.0]), 1.0, None, "got inf at sample 2"),
+        (np.array([0.0, np.nan, np.nan, np.nan, 0.0]), 1.0, None, "at least half of 5 samples, got 2"),
         (np.zeros(8), 0.0, None, "sample_rate_hz: expected a positive number"),
         (np.zeros(8), 1.0, np.array([0.2]), "tau: expected 1 to 4 s"),
         (np.zeros(8), 1.0, np.array([5.0]), "tau: expected 1 to 4 s"),

@@ -37,7 +37,7 @@ def test_filters_predict_over_lost_readings_and_every_number_is_defined(tmp_path
     assert np.deg2rad(row["rmse_deg_s"]) == pytest.approx(np.sqrt(np.nanmean(error**2)), rel=1e-12)
     assert None not in (row["rmse_aligned_deg_s"], row["peak_error_deg_s"], row["lines"][0]["gain"])
     assert run.metrics["sensors"]["mhd_ars"]["missing"] == 0
-    json.dumps(run.metrics, allow_nan=False)
+    json.dumps(run.metrics.to_dict(), allow_nan=False)
     whole = testbed.run(short(tmp_path))
     for name in run.fusion:
         assert np.isfinite(run.fusion[name].rate).all()

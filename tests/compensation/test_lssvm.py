@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from testbed.compensation.lssvm import Lssvm, block_residuals, leave_one_out
+from testbed.compensation.lssvm import Lssvm, kernel_residuals, leave_one_out
 
 GAMMA, WIDTH2 = 30.0, 2.0
 
@@ -93,7 +93,7 @@ def test_block_residuals_are_those_of_refits(rows):
     for block in blocks:
         rest = np.delete(np.arange(y.size), block)
         expected[block] = y[block] - Lssvm.fit(X[rest], y[rest], GAMMA, WIDTH2).predict(X[block])
-    assert np.allclose(block_residuals(X, y, GAMMA, WIDTH2, blocks), expected, rtol=0.0, atol=1e-10)
+    assert np.allclose(kernel_residuals(X, y, GAMMA, WIDTH2, blocks), expected, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.property

@@ -1,4 +1,4 @@
-"""Rows, folds and the polynomial, against numpy and brute-force refits."""
+"""TrainingRows, folds and the polynomial, against numpy and brute-force refits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.linalg import block_diag, solve_triangular
 
 from testbed.compensation.features import Features
 from testbed.compensation.flicker import noise_root, whiten
-from testbed.compensation.polynomial import Polynomial, block_residuals, likeliest_ridge, penalised
+from testbed.compensation.polynomial import Polynomial, likeliest_ridge, penalised, ridge_residuals
 from testbed.compensation.record import Record
 from testbed.compensation.training import block_means, fit_coloured, fit_polynomial, fit_process, gather
 from tests.compensation.thermal_record import WHITE, flicker
@@ -36,7 +36,7 @@ def test_polynomial_block_residuals_are_those_of_refits(rng):
     for block in blocks:
         rest = np.delete(np.arange(90), block)
         expected[block] = y[block] - U[block] @ penalised(U[rest], y[rest], ridge)
-    assert np.allclose(block_residuals(U, y, ridge, blocks), expected, rtol=0.0, atol=1e-11)
+    assert np.allclose(ridge_residuals(U, y, ridge, blocks), expected, rtol=0.0, atol=1e-11)
 
 
 @pytest.mark.oracle

@@ -7,8 +7,8 @@ import pytest
 
 from testbed.compensation.record import Record
 from testbed.drift.injection import PERIODS
-from testbed.drift.leak import DRIFT_PERIOD, FAST_SINE, SLOW_SINE, STEP, audit
-from testbed.drift.quality import low_pass
+from testbed.drift.leak import DRIFT_PERIOD, FAST_SINE, SLOW_SINE, STEP, find_leaks
+from testbed.drift.quality import smoothed
 from testbed.sensors.noise import GyroNoise
 from testbed.signals import sample_times
 
@@ -20,7 +20,7 @@ NOISE = GyroNoise(angle_random_walk=np.radians(7.8e-4) / 60.0, bias_instability=
 
 
 def examine(compensate, record, *more, **options):
-    return audit(compensate, record, compensate(record), *more, **options)
+    return find_leaks(compensate, record, compensate(record), *more, **options)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_removing_the_true_drift_passes_with_every_rate_intact(cycle):
 def test_learning_the_record_as_a_function_of_time_is_a_leak(cycle):
     """A smoother of the record subtracted from it: what a regression does that can tell all moments apart."""
     record, drift = cycle
-    found = examine(lambda of: of.rate - low_pass(of.rate, FS, 1.0 / 1800.0), record, drift)
+    found = examine(lambda of: of.rate - smoothed(of.rate, FS, 1.0 / 1800.0), record, drift)
     assert found.oracle_ratio < 0.7
     text = " ".join(found.leaks)
     assert "period of 21600 s" in text
@@ -60,7 +60,7 @@ def test_learning_the_record_as_a_function_of_time_is_a_leak(cycle):
 
 def test_a_leak_is_found_without_the_truth(cycle):
     record, _ = cycle
-    found = examine(lambda of: of.rate - low_pass(of.rate, FS, 1.0 / 1800.0), record)
+    found = examine(lambda of: of.rate - smoothed(of.rate, FS, 1.0 / 1800.0), record)
     assert found.oracle is None
     assert found.oracle_ratio is None
     assert found.drift_reduction is None
@@ -70,7 +70,7 @@ def test_a_leak_is_found_without_the_truth(cycle):
 def test_a_low_pass_is_no_leak_but_its_coefficients_are_withheld(cycle):
     """It costs bandwidth, which the audit reports, and it equals the low-pass of its own bandwidth."""
     record, drift = cycle
-    found = examine(lambda of: low_pass(of.rate, FS, 1.0 / 100.0), record, drift)
+    found = examine(lambda of: smoothed(of.rate, FS, 1.0 / 100.0), record, drift)
     assert found.leaks == ()
     assert found.after.fit is None
     assert found.before.fit is not None

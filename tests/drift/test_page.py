@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from testbed.compensation.record import Record
-from testbed.drift.figures import allan_figure, drift_figure, gain_figure
-from testbed.drift.leak import audit
+from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
+from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, curves, write_audit
-from testbed.drift.quality import low_pass
+from testbed.drift.quality import smoothed
 from testbed.drift.records import ThermalRecord
-from testbed.drift.summary import summary
+from testbed.drift.summary import audit_summary
 from testbed.sensors.noise import GyroNoise
 from testbed.signals import sample_times
 
@@ -35,16 +35,16 @@ def audited(compensate, *, truth=True, **more):
     drift = thermal.drift if truth else None
     plain = compensate(thermal.record)
     thermal = ThermalRecord(thermal.name, thermal.record, drift)
-    return Audited("<i>method</i>", thermal, plain, audit(compensate, thermal.record, plain, drift), **more)
+    return Audited("<i>method</i>", thermal, plain, find_leaks(compensate, thermal.record, plain, drift), **more)
 
 
 def smooth(of):
     """Cut the band: no coefficients, a low-pass beside it, no leak."""
-    return low_pass(of.rate, FS, 1.0 / 150.0)
+    return smoothed(of.rate, FS, 1.0 / 150.0)
 
 
 def leaking(of):
-    return of.rate - low_pass(of.rate, FS, 1.0 / 1800.0)
+    return of.rate - smoothed(of.rate, FS, 1.0 / 1800.0)
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +218,7 @@ def test_the_gains_are_drawn_and_the_low_pass_is_3_db_down_at_its_bandwidth(resu
 
 def test_a_curve_without_coefficients_is_drawn_without_a_fit(results):
     found = results["smooth"].audit
-    axes = allan_figure(curves(found)).axes[0]
+    axes = residual_allan_figure(curves(found)).axes[0]
     circles = [line for line in axes.get_lines() if line.get_marker() == "o"]
     described = [quality for quality in curves(found).values() if quality.fit is not None]
     assert len(circles) == len(described) == 2  # record and oracle
@@ -250,7 +250,7 @@ def test_the_summary_is_in_the_units_of_its_keys(results):
     """Against the SI figures of the audit, converted by hand: 1 deg/h = 4.848e-6 rad/s, 1 deg/sqrt(h) = 2.909e-4
     rad/sqrt(s).
     """
-    found, figures = results["oracle"].audit, summary(results["oracle"].audit)
+    found, figures = results["oracle"].audit, audit_summary(results["oracle"].audit)
     assert figures["before"]["block_std_100s_deg_h"] == pytest.approx(found.before.block_std / 4.84813681e-6, rel=1e-8)
     coefficients = figures["before"]["coefficients"]
     assert coefficients["N"]["unit"] == "deg/sqrt(h)"

@@ -5,7 +5,7 @@ import pytest
 
 from testbed.allan import allan_deviation
 from testbed.allan.fit import judge_fit
-from testbed.drift.quality import assess, block_std, described_to, low_pass
+from testbed.drift.quality import assess, block_std, described_to, smoothed
 from testbed.sensors.noise import GyroNoise
 from testbed.signals import sample_times
 
@@ -57,12 +57,12 @@ def test_low_pass_is_3_db_down_at_its_bandwidth_and_has_no_phase():
     bandwidth, t = 1.0 / 300.0, sample_times(0, N_TIME, FS)
     rate = np.sin(2.0 * np.pi * bandwidth * t)
     middle = slice(N_TIME // 4, -N_TIME // 4)
-    np.testing.assert_allclose(low_pass(rate, FS, bandwidth)[middle], np.sqrt(0.5) * rate[middle], atol=1e-3)
+    np.testing.assert_allclose(smoothed(rate, FS, bandwidth)[middle], np.sqrt(0.5) * rate[middle], atol=1e-3)
 
 
 def test_coefficients_are_withheld_where_the_noise_model_does_not_hold():
     """A low-pass leaves no white noise at short averaging times: the five terms cannot describe that."""
-    smooth = assess(low_pass(white(4), FS, 0.02), FS, 2000.0)
+    smooth = assess(smoothed(white(4), FS, 0.02), FS, 2000.0)
     assert smooth.fit is None
     plain = assess(white(4), FS, 2000.0)
     assert plain.fit is not None

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import testbed
 from testbed.cli import main
 from testbed.cli.app import app
-from testbed.drift.records import Columns, read
+from testbed.drift.records import Columns, read_thermal
 from testbed.drift.session import read_model
 from testbed.errors import ScenarioError
 
@@ -64,7 +64,7 @@ def table(cycles):
 
 
 def test_a_run_is_read_with_its_true_drift(cycles):
-    run, found = testbed.open_run(cycles / "unseen"), read(cycles / "unseen", Columns())
+    run, found = testbed.open_run(cycles / "unseen"), read_thermal(cycles / "unseen", Columns())
     np.testing.assert_array_equal(found.record.rate, run.sensors["fog"].rate)
     np.testing.assert_array_equal(found.record.temperature, run.sensors["fog"].temperature)
     np.testing.assert_array_equal(found.drift, run.truth["fog_drift"])
@@ -80,7 +80,7 @@ def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
         "sensors: {fog: {preset: fog_paper3}}\n"
     )
     run = testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
-    found = read(tmp_path / "run", Columns())
+    found = read_thermal(tmp_path / "run", Columns())
     expected = np.interp(run.sensors["fog"].time, run.truth.time, run.truth.fog_drift)
     assert found.record.sample_rate_hz == pytest.approx(400.0, rel=1e-9)
     assert found.drift.size == found.record.rate.size == 400
@@ -88,15 +88,15 @@ def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
 
 
 def test_a_text_file_gives_the_same_record_in_any_units(cycles, table):
-    run = read(cycles / "unseen", Columns()).record
-    by_time = read(table, Columns(time="hours", time_unit="h")).record
-    by_rate = read(table, Columns(sample_rate="0.1 Hz", rate="2", temperature="3")).record
+    run = read_thermal(cycles / "unseen", Columns()).record
+    by_time = read_thermal(table, Columns(time="hours", time_unit="h")).record
+    by_rate = read_thermal(table, Columns(sample_rate="0.1 Hz", rate="2", temperature="3")).record
     for record in (by_time, by_rate):
         # Twelve digits were written; at 10 deg/h that is 1e-11 deg/h.
         np.testing.assert_allclose(record.rate, run.rate, atol=1e-10 * DEG_H)
         np.testing.assert_allclose(record.temperature, run.temperature, atol=1e-8)
         assert record.sample_rate_hz == pytest.approx(0.1, rel=1e-9)
-    assert read(table, Columns(time="hours", time_unit="h")).drift is None
+    assert read_thermal(table, Columns(time="hours", time_unit="h")).drift is None
 
 
 def test_applying_writes_what_the_model_says(cycles, model, tmp_path):
@@ -104,11 +104,31 @@ def test_applying_writes_what_the_model_says(cycles, model, tmp_path):
     result = CliRunner().invoke(app, ["compensate", "apply", str(model), str(cycles / "unseen"), "--out", str(out)])
     assert result.exit_code == 0, result.output
     written = np.genfromtxt(out, delimiter=",", names=True)
-    expected = read_model(model).apply(read(cycles / "unseen", Columns()).record)
+    expected = read_model(model).apply(read_thermal(cycles / "unseen", Columns()).record)
     np.testing.assert_allclose(written["rate_deg_h"], expected.rate / DEG_H, rtol=1e-8)
     np.testing.assert_allclose(written["drift_deg_h"], expected.drift / DEG_H, rtol=1e-8)
     np.testing.assert_array_equal(written["extrapolated"], expected.extrapolated)
     np.testing.assert_allclose(written["time_s"], 10.0 * np.arange(8520))
+
+
+def test_each_command_says_its_result_to_a_program(cycles, model, tmp_path):
+    def document(*words):
+        result = CliRunner().invoke(app, ["compensate", *map(str, words), "--json"])
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout)
+
+    out = tmp_path / "model.json"
+    found = document("train", cycles / "up", cycles / "down", "--out", out)
+    assert found["cycles"] == ["up, fog", "down, fog"]
+    assert found["blocked_error_deg_h"] == pytest.approx(read_model(out).blocked_error / DEG_H)
+    assert found["written"] == str(out)
+    assert out.read_text() == model.read_text()
+    found = document("apply", model, cycles / "unseen", "--out", tmp_path / "plain.csv")
+    share = np.genfromtxt(tmp_path / "plain.csv", delimiter=",", names=True)["extrapolated"].mean()
+    assert (found["record"], found["method"]) == ("unseen, fog", "gradient")
+    assert found["extrapolated"] == pytest.approx(share)
+    found = document("audit", model, cycles / "unseen", "--out", tmp_path / "audit")
+    assert found == {**json.loads((tmp_path / "audit" / "audit.json").read_text()), "written": str(tmp_path / "audit")}
 
 
 def test_the_audit_of_a_frozen_model_passes_and_reduces_the_drift(cycles, model, tmp_path):
@@ -162,11 +182,11 @@ def test_the_audit_of_a_text_file_needs_no_truth(table, model, tmp_path):
 
 def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
     """A compensation that trains on the record it corrects, here a smoother in the place of the paper's pipeline."""
-    from testbed.drift.quality import low_pass
+    from testbed.drift.quality import smoothed
 
     class Result:
         def __init__(self, record):
-            self.rate = record.rate - low_pass(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
+            self.rate = record.rate - smoothed(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
 
     monkeypatch.setattr("testbed.drift.session.paper3.compensate", Result)
     status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path], monkeypatch, capsys)
@@ -180,7 +200,7 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
     ("arguments", "message"),
     [
         (["train", "{unseen}", "--method", "gradeint"], "did you mean 'gradient'"),
-        (["train", "{missing}"], "expected a text file or a run folder"),
+        (["train", "{missing}"], "expected a recording or a run folder"),
         (["train", "{table}"], "expected either the sample rate"),
         (["train", "{table}", "--time", "hours", "--temperature-unit", "m"], "--temperature-unit"),
         (["train", "{table}", "--rate", "1", "--column", "speed"], "no column 'speed'"),
@@ -201,11 +221,11 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         (["apply", "{model}", "{gap}", "--time", "hours", "--time-unit", "h"], "fill the gap or cut the record"),
         (
             ["apply", "{model}", "{nan}", "--rate", "0.1"],
-            "nan.csv:32: expected a finite number in 'rate', got 'nan'; fill it",
+            "nan.csv:32: expected a finite number in 'rate', got none; fill it",
         ),
         (
             ["apply", "{model}", "{comma}", "--rate", "0.1"],
-            "comma.csv:2: expected a finite number in 'rate', got '10,5'; write a",
+            "comma.csv:3: expected a finite number in 'rate', got 'x'",
         ),
         (
             ["audit", "{missing}", "{unseen}"],
@@ -227,7 +247,7 @@ def test_bad_input_ends_with_2_and_leaves_nothing(
         "short": lines[:100],
         "gap": lines[:31] + lines[35:],
         "nan": [*lines[:31], "0.1,nan,20", *lines[32:]],
-        "comma": ["hours;rate;temperature", "0;10,5;20,0", "0,1;10,5;20,0"],
+        "comma": ["hours;rate;temperature", "0;10,5;20,0", "0,1;x;20,0", *["0,2;10,5;20,0"] * 9],
         "slow": [lines[0], *lines[1::20]],
     }
     for name, text in texts.items():
@@ -253,7 +273,7 @@ def test_a_run_without_a_thermometer_is_refused(tmp_path):
     scene.write_text("name: still\nduration: 1 s\nmotion: [static: {}]\nsensors: {mems_gyro: {preset: adis16505}}\n")
     testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
     with pytest.raises(ScenarioError, match="expected one sensor with a thermometer, got none"):
-        read(tmp_path / "run", Columns())
+        read_thermal(tmp_path / "run", Columns())
 
 
 @pytest.mark.parametrize(("command", "what"), [("train", "a file"), ("apply", "a file"), ("audit", "a folder")])

@@ -64,8 +64,8 @@ def test_table_shows_estimates_intervals_and_limits(tmp_path, white_file):
         assert rows[letter][2] == "not identified"
         assert rows[letter][4].startswith("< ")
     assert "The five terms describe the curve from 0.01 s to 125 s" in result.stdout
-    assert "wrote allan_static.svg" in result.stdout
-    assert [path.name for path in tmp_path.iterdir()] == ["allan_static.svg"]
+    assert "wrote runs/allan_static.svg" in result.stdout
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["allan_static.svg"]
 
 
 @pytest.mark.parametrize("suffix", ["svg", "PNG", "pdf"])
@@ -82,9 +82,8 @@ def test_time_column_and_format(tmp_path, white_file, suffix):
     "options",
     [
         (),
-        ("--unit", "deg/s"),
+        ("--unit", "deg/s", "--rate", "10", "--time", "t"),
         ("--unit", "m", "--rate", "1"),
-        ("--unit", "deg/s", "--rate", "100"),
         ("--unit", "deg/s", "--rate", "100", "--column", "rat"),
         ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--out", "a.jpg"),
         ("--unit", "deg/s", "--rate", "100", "--column", "rate", "--min-tau", "100"),
@@ -103,8 +102,8 @@ def test_run_folder_gives_every_sensor_and_is_left_alone(still_run, tmp_path):
     assert result.returncode == 0, result.stderr
     assert "mhd_ars of short, less its noise-free reading" in result.stdout
     assert "mems_gyro of short, less its noise-free reading" in result.stdout
-    assert "wrote allan_run.svg" in result.stdout
-    assert (tmp_path / "allan_run.svg").is_file()
+    assert "wrote runs/allan_run.svg" in result.stdout
+    assert (tmp_path / "runs" / "allan_run.svg").is_file()
     assert sorted(path.name for path in still_run.iterdir()) == before
     assert_clear(call("allan", still_run, "--sensor", "mhd_arz", cwd=tmp_path), 2)
     assert_clear(call("allan", still_run, "--unit", "deg/s", cwd=tmp_path), 2)
@@ -140,15 +139,19 @@ def test_the_record_of_a_run_begins_after_settling(still_run):
         assert one.rate.size == round(seconds * one.sample_rate_hz)
 
 
-def test_a_gap_in_the_readings_is_refused(still_run, monkeypatch):
+def test_a_sensor_with_gaps_is_analysed_beside_the_others(still_run, monkeypatch):
     run = testbed.open_run(still_run)
-    sensors = {
-        name: SimpleNamespace(rate=np.where(np.arange(s.rate.size) == 900, np.nan, s.rate))
-        for name, s in run.sensors.items()
-    }
-    monkeypatch.setattr("testbed.runs.folder.open_run", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth))
-    with pytest.raises(ScenarioError, match="without gaps, got 1 that are missing"):
-        read_run(still_run, "mems_gyro")
+
+    def with_gaps(rate):
+        return SimpleNamespace(rate=np.where(np.arange(rate.size) % 90 == 7, np.nan, rate))
+
+    sensors = {name: with_gaps(signals.rate) for name, signals in run.sensors.items()}
+    monkeypatch.setattr(
+        "testbed.runs.results.RunRecord.open", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth)
+    )
+    for record in read_run(still_run):
+        assert np.isnan(record.rate).any()
+        assert analyse(record).fit.angle_random_walk.upper > 0.0
 
 
 @pytest.mark.oracle
@@ -193,17 +196,18 @@ def test_a_refused_fit_prints_no_coefficient(tmp_path):
     assert "│" not in result.stdout
     for term in TERMS:
         assert term.unit not in result.stdout.replace("rad/s", "")
-    figure = (tmp_path / "allan_markov.svg").read_text()
+    figure = (tmp_path / "runs" / "allan_markov.svg").read_text()
     assert figure.startswith("<?xml")
 
 
 @pytest.mark.parametrize(
     ("rate", "message"),
     [
-        (np.ones(1000), "no deviation at all at 0.01 s"),
+        (np.ones(1000), "all readings are 57.2958 deg/s: rounded to words above"),
         (np.array([1.0, 2.0]), "at least 4 samples"),
         (np.array([1.0, 2.0, 1.0, 3.0, 2.0, 5.0, 1.0, 0.0]), "expected at least 5 averaging times, got 2"),
-        (np.array([1.0, np.nan, 1.0, 3.0]), "got nan at sample 1"),
+        (np.array([1.0, np.inf, 1.0, 3.0]), "got inf at sample 1"),
+        (np.array([1.0, np.nan, np.nan, np.nan, 3.0]), "at least half of 5 samples, got 2"),
     ],
 )
 def test_records_without_noise_or_length_are_refused(rate, message):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from testbed.errors import ScenarioError
-from testbed.judging.allan_records import read, read_file
+from testbed.judging.allan_records import read
+from testbed.logs.selection import Selection
 
 VALUES = np.array([0.5, -1.25, 2.0, 1e-3, -4.0])
 
@@ -17,6 +18,12 @@ def write(tmp_path, text, name="log.csv"):
     path = tmp_path / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def read_file(path, *, column=None, sample_rate_hz=None, sensor=None, **options):
+    rate = None if sample_rate_hz is None else str(sample_rate_hz)
+    options = {"rate": rate, **options}
+    return read(path, Selection(column=[column] if column else None, **options), sensor=sensor)[0]
 
 
 @pytest.mark.parametrize(
@@ -69,50 +76,65 @@ def test_rounded_times_are_even(tmp_path):
     ("text", "options", "message"),
     [
         ("", {"rate": "1"}, "log.csv: expected a column of numbers, got nothing"),
-        ("rate\n", {"rate": "1"}, "expected at least 4 samples, got 0"),
+        ("rate\n", {"rate": "1"}, "expected a column of numbers, got 'rate'"),
         ("1\n2\n3\n", {"rate": "1"}, "expected at least 4 samples, got 3"),
         ("rate\n1\n2\nx\n4\n", {"rate": "1"}, "log.csv:4: expected a finite number in 'rate', got 'x'"),
-        ("rate\n1\n\n# so\nnan\n4\n5\n", {"rate": "1"}, "log.csv:5: expected a finite number in 'rate', got 'nan'"),
-        ("1\n2\n-inf\n4\n", {"rate": "1"}, "log.csv:3: expected a finite number in column 1, got '-inf'"),
-        ("a,b\n1,2\n3\n4,5\n6,7\n", {"rate": "1", "column": "b"}, "log.csv:3: expected a finite number in 'b', got ''"),
-        ("a,b\n1,2\n", {"rate": "1"}, "--column: expected one of 'a', 'b'"),
+        ("1\n2\n-inf\n4\n", {"rate": "1"}, "log.csv:3: expected a finite number in column 1, got -inf"),
+        ("a,b\n1,2\n3\n4,5\n6,7\n", {"rate": "1", "column": "b"}, "log.csv:3: expected 2 fields"),
+        ("a,b\n1.5,2\n", {"rate": "1"}, "--column: expected one of 'a', 'b'"),
         ("1 2\n1 2\n", {"rate": "1"}, "--column: expected one of column 1, column 2"),
         ("a,b\n1,2\n", {"rate": "1", "column": "c"}, "--column: no column 'c'; the header has 'a', 'b'"),
         ("1 2\n1 2\n", {"rate": "1", "column": "3"}, "--column: no column '3'; there are 2"),
         ("a,b\n1,2\n", {"time": "t", "column": "b"}, "--time: no column 't'"),
         ("1\n2\n3\n4\n", {}, "expected either the sample rate"),
-        ("1\n2\n3\n4\n", {"rate": "1", "time": "1"}, "expected either the sample rate"),
+        (
+            "t,r\n1,1\n2,2\n3,3\n4,4\n",
+            {"rate": "2", "time": "t"},
+            "--rate: the nominal rate 2 Hz contradicts the stamps",
+        ),
         ("1\n2\n3\n4\n", {"rate": "0"}, "--rate: expected more than 0 Hz"),
         ("1\n2\n3\n4\n", {"rate": "inf"}, "--rate: expected more than 0 Hz"),
         ("1\n2\n3\n4\n", {"rate": "10 s"}, "--rate: expected a quantity in Hz"),
-        ("1\n2\n3\n4\n", {"rate": "1", "unit": "deg"}, "--unit: expected a quantity in rad/s"),
-        ("1\n2\n3\n4\n", {"rate": "1", "unit": None}, "--unit: expected the unit of the column"),
-        ("1\n2\n3\n4\n", {"rate": "1", "time_unit": "V"}, "--time-unit: expected a quantity in s"),
+        ("1\n2\n3\n4\n", {"rate": "1", "unit": "deg"}, "--kind: deg of column 1 is a unit of angle"),
+        ("1\n2\n3\n4\n", {"rate": "1", "unit": "m"}, "--unit: 'm' is no unit of a channel"),
+        ("1\n2\n3\n4\n", {"rate": "1", "unit": None}, "--unit: expected the unit of column 1"),
+        ("1,1\n2,2\n", {"time": "1", "time_unit": "V"}, "--time-unit: expected a quantity in s"),
         ("1\n2\n3\n4\n", {"rate": "1", "sensor": "gyro"}, "--sensor: expected a run folder"),
+        ("3,1\n2,1\n1,1\n0,1\n", {"time": "1"}, "--time: 3 stamps go back"),
         (
-            "0,1\n1,1\n2,1\n\n4,1\n5,1\n",
+            "0,1\n1,1\n1.4,1\n2,1\n3,1\n4,1\n",
             {"time": "1"},
-            "log.csv:5: uneven or missing sample: time goes from 2 s to 4 s",
+            "log.csv:3: --time: 1 steps are uneven; first 1 s from the start",
         ),
-        ("3,1\n2,1\n1,1\n0,1\n", {"time": "1"}, "--time: expected times that increase"),
+        (
+            "0,1\n1,1\n1,1\n2,1\n3,1\n" + "".join(f"{k},1\n" for k in range(4, 40)),
+            {"time": "1"},
+            "log.csv:3: --time: 1 stamps stand",
+        ),
     ],
 )
 def test_faults_are_named_with_their_place(tmp_path, text, options, message):
     with pytest.raises(ScenarioError) as error:
-        read(write(tmp_path, text), **{"unit": "rad/s", **options})
+        read_file(write(tmp_path, text), **{"unit": "rad/s", **options})
     assert message in str(error.value)
+
+
+def test_lost_samples_are_named_by_line_and_seconds_and_stand_as_nan(tmp_path):
+    record = read_file(write(tmp_path, "0,1\n1,1\n2,1\n\n4,nan\n5,1\n6,2\n"), time="1", unit="rad/s")
+    assert np.flatnonzero(np.isnan(record.rate)).tolist() == [3, 4]
+    assert "1 samples lost in 1 gaps (at 2 s (line 5))" in " ".join(record.notes)
 
 
 def test_what_is_no_text_is_refused(tmp_path):
     path = tmp_path / "log.csv"
     path.write_bytes(bytes(range(256)))
     with pytest.raises(ScenarioError, match="cannot be read"):
-        read(path, unit="rad/s", rate="1")
-    with pytest.raises(ScenarioError, match="expected a text file or a run folder"):
-        read(tmp_path / "nothing.csv", unit="rad/s", rate="1")
+        read_file(path, unit="rad/s", rate="1")
+    with pytest.raises(ScenarioError, match="expected a recording or a run folder"):
+        read_file(tmp_path / "nothing.csv", unit="rad/s", rate="1")
 
 
 def test_rate_takes_its_unit(tmp_path):
     path = write(tmp_path, "1\n2\n3\n4\n")
-    assert read(path, unit="rad/s", rate="2 kHz")[0].sample_rate_hz == 2000.0
-    assert math.isclose(read(path, unit="rad/s", rate="2.5e2")[0].sample_rate_hz, 250.0)
+    assert read_file(path, unit="rad/s", rate="2 kHz").sample_rate_hz == 2000.0
+    assert math.isclose(read_file(path, unit="rad/s", rate="2.5e2").sample_rate_hz, 250.0)

@@ -93,6 +93,20 @@ def test_detail_shows_all_rates_in_their_colors(shown):
     assert covered(image, COMMANDED)[0] > 0.0
 
 
+def test_lost_readings_are_a_gap_in_the_line(viewer, synthetic_run, tmp_path):
+    """Every reading from 6.2 to 6.3 s is lost: a fifth of the 0.5 s that are shown has no line, the rest has."""
+    run = synthetic_run(240_000, filters=("kalman",))
+    run.readings["mhd_ars"] = np.full(run.n_time, 0.03)  # above all others
+    run.readings["mhd_ars"][124_000:126_000] = np.nan
+    show(viewer, run.record(tmp_path / "gap.rrd", settle=6.0, detail=(6.0, 8.0)), 6.2)
+    image = pixels(settled_picture(viewer, "Rate, every sample from 6 to 6.5 s [rad/s]"))
+    blue = image[..., 2] - image[..., 0] > 40  # its edges are mixed with the background
+    drawn = np.flatnonzero(blue[blue.sum(axis=1).argmax()])  # the row of pixels of the line, not of the legend
+    steps, span = np.diff(drawn), np.ptp(drawn)
+    assert steps.max() / span == pytest.approx(0.2, abs=0.02)
+    assert np.sort(steps)[-2] / span < 0.02
+
+
 def test_fluid_profile_fills_the_height_of_the_channel(shown):
     image = pixels(settled_picture(shown, "Fluid velocity profile, mhd_ars"))
     rows, columns = covered(image, SENSORS[0])

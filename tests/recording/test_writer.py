@@ -287,3 +287,17 @@ except RunError as error:
     assert "RunError" in done.stdout, done.stderr
     assert done.stderr == "", "the library's own log would only repeat it"
     assert "recording.rrd: the recording could not be written (its disk is full: 0.0 MB free)" in done.stdout
+
+
+def test_lost_readings_are_marked_and_readings_that_were_not_due_are_not(synthetic_run, tmp_path):
+    """In the window each lost reading, elsewhere each bin without one; of a diagnostic nothing."""
+    run = synthetic_run(40_000)
+    lost = np.zeros(run.n_time, bool)
+    lost[21_000:21_500], lost[30_000:33_000] = True, True
+    run.readings["mhd_ars"][lost] = np.nan
+    rows = scalars(run.record(tmp_path / "recording.rrd"))
+    times, recorded = rows["/sensors/mhd_ars/rate"]
+    index = times[np.isnan(recorded)].astype(np.int64) // 50_000
+    # The window is 1 to 1.25 s, samples 20 000 to 25 000; a bin holds ten of the 40 000.
+    assert index.tolist() == [*range(21_000, 21_500), *range(30_000, 33_000, 10)]
+    assert not np.isnan(rows["/fusion/kalman/innovation_mems_gyro"][1]).any()

@@ -15,7 +15,7 @@ from testbed.judging.budget import budget_summary
 from testbed.pages.palette import series_colors
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import digest_run
-from testbed.report.folder import Budget, RunMetrics, open_run
+from testbed.runs.metrics import Budget, RunMetrics
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def test_the_terminal_says_it_in_one_line(
     )
     entry = run[0]["fusion"]["complementary"]["lines"][0]
     assert f"{entry['phase_deg']:+.2f} deg, {entry['error_deg_s'] / entry['optimum_deg_s']:.1f}" in text
-    quiet = run[0] | {"budget": None}
+    quiet = RunMetrics.model_validate({**run[0], "budget": None})
     print_metrics(quiet, tmp_path)
     assert "noise floor:" not in capsys.readouterr().out
 
@@ -90,7 +90,8 @@ def test_no_terminal_cuts_a_number(
     """Lines are left to the report where they do not fit, also behind a long name."""
     row = run[0]["fusion"]["complementary"]
     monkeypatch.setattr("testbed.cli.terminal._console", lambda: Console(width=width))
-    print_metrics(run[0] | {"fusion": {"complementary": row, "a_long_filter_name": row}}, tmp_path)
+    fusion = {"complementary": row, "a_long_filter_name": row}
+    print_metrics(RunMetrics.model_validate({**run[0], "fusion": fusion}), tmp_path)
     text = capsys.readouterr().out
     assert "\N{HORIZONTAL ELLIPSIS}" not in text
     assert f"{row['rmse_deg_s'] / row['optimum_rmse_deg_s']:.1f} │" in text
@@ -109,9 +110,8 @@ def test_the_report_has_the_section(run: tuple[dict[str, Any], Path]) -> None:
 
 def test_errors_by_band_are_the_error_of_the_run(run: tuple[dict[str, Any], Path]) -> None:
     """What the bands hold is part of the mean square, and the lag at 40 Hz is in the band from 10 to 100 Hz."""
-    metrics = RunMetrics.model_validate(run[0])
-    with open_run(run[1] / "run.nc") as data:
-        digest = digest_run(data, metrics)
+    stored = testbed.open_run(run[1])
+    metrics, digest = stored.metrics, digest_run(stored)
     assert metrics.budget is not None
     rows = band_rows(metrics.budget, digest)
     found = [row["filters"]["complementary"] for row in rows]

@@ -18,7 +18,7 @@ from testbed.pages.palette import series_colors
 from testbed.pages.svg import svg_text
 from testbed.report.digest import Digest, ErrorTrace, RateTrace
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure
-from testbed.report.folder import FloorDensity
+from testbed.runs.metrics import FloorDensity
 
 FS = 1000.0
 

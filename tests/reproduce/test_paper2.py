@@ -17,17 +17,17 @@ from testbed.metrics.spectra import WelchDensity
 from testbed.reproduce import PAPERS, SEEDS, run_paper
 from testbed.reproduce.paper2 import (
     CHANNELS,
-    CLOCK_HZ,
-    Protocol,
+    BenchProtocol,
     _claims,
     amplitudes,
+    bench_readings,
     mhd_response,
     noise_density,
-    read,
     report,
     switched_on,
 )
 from testbed.sensors import load_preset
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from testbed.sensors.mhd_ars import MhdArs
     from testbed.signals import FloatArray
 
-FEW = Protocol(
+FEW = BenchProtocol(
     scale_amplitudes=(20.0, 50.0),
     scale_frequencies=(0.5, 3.0, 10.0, 60.0),
     linear_amplitudes=(1.0, 25.0, 50.0),
@@ -48,7 +48,7 @@ FEW = Protocol(
 
 
 def test_the_protocol_is_the_papers() -> None:
-    full = Protocol()
+    full = BenchProtocol()
     assert list(full.scale_amplitudes) == [20, 30, 40, 50]
     assert len(full.scale_frequencies) == 9 + 20 + 8
     assert min(full.scale_frequencies) == 0.1
@@ -60,7 +60,7 @@ def test_the_protocol_is_the_papers() -> None:
 @pytest.mark.oracle
 def test_sensor_amplitudes_are_those_of_their_responses() -> None:
     for f in (2.0, 50.0):
-        gyro, mhd, _ = amplitudes(f, 50.0, 1, Protocol(), switched_on())
+        gyro, mhd, _ = amplitudes(f, 50.0, 1, BenchProtocol(), switched_on())
         # Leaves the grid of the channel and the hold between samples; start-up is gone after a second.
         assert mhd / 50.0 == pytest.approx(abs(mhd_response(np.array([f]))[0]), rel=2e-4, abs=0.0)
         ratio = f / 10.0
@@ -163,7 +163,7 @@ def shares(freq: FloatArray) -> tuple[FloatArray, FloatArray]:
     |H|^2.
     """
     stage, A, K = settled_filter()
-    z = np.exp(2j * np.pi * freq / CLOCK_HZ)
+    z = np.exp(2j * np.pi * freq / BASE_RATE_HZ)
     to_rate = np.array([np.linalg.solve(one * np.eye(len(A)) - A, one * K)[0] for one in z]).T
     by = dict(zip(stage.model.sensors, to_rate, strict=True))
     own = 1e-14 / np.abs(mhd_response(freq)) ** 2
@@ -187,10 +187,10 @@ def test_measured_noise_is_within_a_decibel_of_the_mhd_ars() -> None:
     """
     corner = cast("MhdArs", load_preset("mhd03")).channel.corner_freq_hz
     stage, *_ = settled_filter()
-    signals = read(np.zeros(60 * 20_000), 3, stage)
+    signals = bench_readings(np.zeros(60 * 20_000), 3, stage)
     density = []
     for name in ("fused", "mhd_ars"):
-        welch = WelchDensity(CLOCK_HZ, 20_000)
+        welch = WelchDensity(BASE_RATE_HZ, 20_000)
         welch.process(signals[name])
         density.append(welch.density)
     freq = welch.freq_hz

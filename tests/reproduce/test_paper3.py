@@ -19,7 +19,7 @@ SHOWN = (
     "least_gain_in_drift_band",
     "step_gain",
 )
-SHORT = paper3.Protocol(0.1, PaperOptions(trials=10, grouping="period", wolves=10, iterations=5))
+SHORT = paper3.DriftProtocol(0.1, PaperOptions(trials=10, grouping="period", wolves=10, iterations=5))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_the_honest_rows_never_see_the_record_that_they_are_judged_on(monkeypatc
     """Other programmes and other noise, one cycle or two; only the paper's rows train on the record itself."""
     seen = []
     monkeypatch.setattr(paper3, "train", lambda cycles, method: seen.append(cycles))
-    rows = list(paper3.cases(1, paper3.Protocol(0.01)))
+    rows = list(paper3.cases(1, paper3.DriftProtocol(0.01)))
     judged = paper3.cycle("paper", 1, 0.01).record
     assert [len(cycles) for cycles in seen] == [2, 2, 1, 2]
     for record in (record for cycles in seen for record in cycles):

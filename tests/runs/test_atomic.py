@@ -11,9 +11,9 @@ import time
 import pytest
 
 from testbed.errors import ScenarioError
+from testbed.notebook import open_run
 from testbed.runs import atomic
 from testbed.runs.atomic import exchange, write_text
-from testbed.runs.folder import open_run
 from testbed.runs.leftovers import beside, heal
 from tests.runs.test_manifest import small_run
 

@@ -10,8 +10,9 @@ import xarray as xr
 
 import testbed
 from testbed.errors import RunError, ScenarioError
+from testbed.notebook import open_run
 from testbed.runs.atomic import write_text
-from testbed.runs.folder import ESSENTIAL, RunFolder, failing_as_run_error, open_run, write_metrics
+from testbed.runs.folder import ESSENTIAL, RunFolder, failing_as_run_error, write_metrics
 from testbed.scenario.loader import load_scenario
 from tests.chain.test_pipeline import signals
 from tests.scenes import short
@@ -155,13 +156,15 @@ def test_an_interrupted_run_leaves_nothing_behind_and_the_earlier_one_alone(tmp_
 
 
 def test_open_run_says_what_is_missing(tmp_path):
-    with pytest.raises(
-        ScenarioError, match=r"expected a run folder, but scenario\.yaml, run\.nc, metrics\.json is missing"
-    ):
+    with pytest.raises(ScenarioError, match=r"expected a run folder, but .*scenario\.yaml, .*run\.nc, .*metrics\.json"):
         open_run(tmp_path)
     for name in ESSENTIAL:
         (tmp_path / name).write_text("{}")
-    with pytest.raises(ScenarioError, match="no readable run"):
+    with pytest.raises(ScenarioError, match=r"metrics\.json: scenario: Field required"):
+        open_run(tmp_path)
+    least = {"scenario": "a", "seed": 1, "duration_s": 1.0, "settle_s": 0.0, "sensors": {}, "fusion": {}}
+    (tmp_path / "metrics.json").write_text(json.dumps(least))
+    with pytest.raises(ScenarioError, match=r"run\.nc: expected a complete NetCDF-4 file"):
         open_run(tmp_path)
 
 

@@ -9,8 +9,9 @@ import pytest
 
 import testbed
 from testbed.errors import RunError, ScenarioError
+from testbed.notebook import open_run
 from testbed.report import write_report
-from testbed.runs.folder import RunFolder, open_run
+from testbed.runs.folder import RunFolder
 from testbed.runs.manifest import read_manifest, rewrite, strangers
 from tests.scenes import short
 

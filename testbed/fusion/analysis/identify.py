@@ -21,6 +21,12 @@ _ROUNDS = 200
 _SPREADS = ((0.0, 1.0), (0.5, 1.0), (0.0, 0.5))
 # Half the sum of squares that is rounding only.
 _EXACT = 1e-20
+# How far beyond the band a pole may go (in logarithm), and how far a damping may be from 1: farther off it acts as a
+# constant or an integrator there, and its powers overflow.
+_BEYOND = np.log(1e4)
+# A coefficient of the numerator that adds less than this to the response is rounding: left in, a zero at 1e18 rad/s
+# would make a sensor's inverse useless.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -161,8 +167,13 @@ def identify(
     unit = 2.0 * np.pi * np.sqrt(freq[0] * freq[-1])
     s = 2j * np.pi * freq / unit
 
+    lowest, highest = _reach(np.abs(s), real_poles, pole_pairs)
+
+    def denominator(place: FloatArray) -> FloatArray:
+        return _denominator(np.clip(place, lowest, highest), real_poles)
+
     def residual(place: FloatArray) -> FloatArray:
-        error = w * (_fitted(s, H, w, _denominator(place, real_poles), blind_at_dc)[1] / H - 1.0)
+        error = w * (_fitted(s, H, w, denominator(place), blind_at_dc)[1] / H - 1.0)
         return np.concatenate([error.real, error.imag])
 
     tried = []
@@ -172,10 +183,17 @@ def identify(
         tried.append(least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=rounds))
         if tried[-1].cost < _EXACT:
             break
-    D = _denominator(min(tried, key=lambda one: float(one.cost)).x, real_poles)
+    D = denominator(min(tried, key=lambda one: float(one.cost)).x)
     N, G = _fitted(s, H, w, D, blind_at_dc)
     powers = unit ** np.arange(n_pole + 1.0)
     return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / H - 1.0))))
+
+
+def _reach(freq: FloatArray, real_poles: int, pole_pairs: int) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the largest place of real poles and corners, and of dampings, in logarithm."""
+    damping = np.full(pole_pairs, _BEYOND)
+    low, high = (np.full(real_poles + pole_pairs, np.log(edge)) for edge in (freq[0], freq[-1]))
+    return np.concatenate([low - _BEYOND, -damping]), np.concatenate([high + _BEYOND, damping])
 
 
 def _start(reach: FloatArray, real_poles: int, pole_pairs: int, share: tuple[float, float]) -> FloatArray:
@@ -209,6 +227,7 @@ def _fitted(
     rows = (w / H)[:, None] * basis
     system, wanted = np.concatenate([rows.real, rows.imag]), np.concatenate([w, np.zeros_like(w)])
     size = np.linalg.norm(system, axis=0)
-    fit = np.linalg.lstsq(system / size, wanted, rcond=None)[0] / size
+    share = np.linalg.lstsq(system / size, wanted, rcond=None)[0]
+    fit = np.where(np.abs(share) > _ROUNDING * np.linalg.norm(w), share, 0.0) / size
     N = np.concatenate([fit, np.zeros(lowest)])
     return N, basis @ fit

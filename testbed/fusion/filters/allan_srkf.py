@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from testbed.fusion.filters.shakf import AdaptiveFilter
-from testbed.fusion.model_filter import DEG, CovarianceParameters, Variance
-from testbed.units import PositiveDuration
+from testbed.fusion.model_filter import CovarianceParameters, Variance
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,6 +69,11 @@ class AllanSrkf(AdaptiveFilter):
     """
 
     Parameters: ClassVar[type[Part]] = AllanSrkfParameters
+    # R has infinite memory within its clamp of 10: after a spike the noise may be sqrt(10) times as large for minutes.
+    spike_leaves = 10.0**0.5
+    dishonest = (
+        "q is chosen so large, for paper 2's swings of 50 deg/s, that P claims twenty times the error of smaller ones"
+    )
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: AllanSrkfParameters

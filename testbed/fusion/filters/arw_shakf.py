@@ -11,8 +11,7 @@ from pydantic import BeforeValidator, Field
 from testbed.fusion.bands import Bands, load_bands
 from testbed.fusion.base import Rows
 from testbed.fusion.filters.shakf import SageHusa, SageHusaParameters
-from testbed.fusion.model_filter import DEG
-from testbed.units import PositiveDuration
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -140,8 +139,9 @@ class ArwShakf(SageHusa):
 
 
 class ArwShakfLiteral(ArwShakf):
-    """The filter of `ArwShakf` as printed: innovations themselves in (17) and (34), N_k with infinite memory, bands
-    from the second reading.
+    """The filter of paper 1 as printed, which `arw_shakf` corrects.
+
+    Innovations themselves stand in (17) and (34), N_k has infinite memory, bands hold from the second reading.
 
     At the q of `Shakf` it repairs nothing: (17) and S undo the reset of R. With its own q of 0.3 (deg/s)^2/s it works,
     and so does `Shakf`.
@@ -161,3 +161,4 @@ class ArwShakfLiteral(ArwShakf):
     """
 
     Parameters: ClassVar[type[Part]] = ArwShakfLiteralParameters
+    dishonest = "without the gyro's input noise in Q its slow error is not counted; printed so"

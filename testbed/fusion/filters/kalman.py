@@ -9,7 +9,8 @@ from pydantic import Field
 
 from testbed.fusion.base import Rows
 from testbed.fusion.kernels.covariance import kalman_kernel
-from testbed.fusion.model_filter import DEG, CovarianceParameters, ModelFilter, Variance
+from testbed.fusion.model_filter import CovarianceParameters, ModelFilter, Variance
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from testbed.fusion.base import Rows
 from testbed.fusion.kernels.covariance import SENSOR, adaptive_kernel
-from testbed.fusion.model_filter import DEG, CovarianceParameters, ModelFilter, Variance
+from testbed.fusion.model_filter import CovarianceParameters, ModelFilter, Variance
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -132,3 +133,7 @@ class Shakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ShakfParameters
+    blames_the_other = "R of the gyro takes what a railed MHD sensor did for noise, and falls back slowly"
+    dishonest = (
+        "R follows the lag, P follows R through a gain that no longer fits: the paper's failure, kept to show it"
+    )

@@ -37,7 +37,7 @@ class SteadyStateParameters(Part):
 
 
 class SteadyState(BlockFilter):
-    r"""Kalman filter with the gains of the periodic Riccati solution, order and q those of the `optimum` of a sine.
+    r"""Kalman filter with the gains of the periodic Riccati solution, order and q those of the optimum of a sine.
 
     .. math:: x^- = F x, \quad x = x^- + K_p (z - H x^-)
 

@@ -13,8 +13,8 @@ from pydantic import Field
 from testbed.fusion.base import Rows
 from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.model import build_model
-from testbed.fusion.model_filter import DEG, FormParameters, ModelFilter
-from testbed.units import PositiveDuration
+from testbed.fusion.model_filter import FormParameters, ModelFilter
+from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,7 +61,7 @@ class WidebandParameters(FormParameters):
 
 
 class Wideband(ModelFilter):
-    r"""Bank of Kalman filters with process noise :math:`q_1 \ldots q_M`, mixed by innovation likelihood.
+    r"""Bank of Kalman filters, one per level of process noise, mixed by innovation likelihood.
 
     .. math:: w_i \propto e^{s_i}, \quad s_i \leftarrow \lambda s_i - \tfrac12 (\ln C_i + e_i^2 / C_i), \quad
         \hat x = \sum w_i \hat x_i, \quad P = \sum w_i (P_i + (\hat x_i - \hat x)^2)

@@ -3,8 +3,8 @@
 `kalman_kernel`, `fixed_gain_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
 sensors): loops of constant length unroll. They close over integers only, which numba's disk cache keys by value, so
 that a second process loads and does not compile. That cache watches no other file than the kernel's own: what calls
-each other stays in one file, which is why this one is long. `bank_kernel` and `two_path_kernel` share numbers with it
-but no code; who changes such a number touches those files too.
+each other stays in one file, which is why this one is long. `testbed.fusion.kernels.bank` and
+`testbed.fusion.two_paths.kernel` share numbers with it but no code; who changes such a number touches those files too.
 
 The arrays handed in decide the precision: in single precision no sum of the state and covariance recursion is formed in
 double. `form` decides what stands for the covariance: P itself (CONVENTIONAL, JOSEPH), or, in SQUARE_ROOT, roots D and

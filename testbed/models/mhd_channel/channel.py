@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from testbed.models.mhd_channel.chebyshev import chebyshev_points
-from testbed.models.mhd_channel.fluids import FLUIDS, Fluid, NamedFluid
+from testbed.models.mhd_channel.fluids import NamedFluid
 from testbed.models.mhd_channel.modes import ChannelModes, ChannelStage, channel_modes
 from testbed.models.mhd_channel.thermal_drift import drift
 from testbed.parts import Part
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from pydantic import ValidationInfo
 
     from testbed.signals import ComplexArray, FloatArray
-
-__all__ = ["FLUIDS", "ChannelStage", "Fluid", "MhdChannel", "one_mode_response"]
 
 MIN_NODES = 8
 # Rounding grows as nodes^4 (about 1e-12 of the response at 512), and nothing measured needs more.
@@ -71,6 +69,12 @@ class MhdChannel(Part):
     References
     ----------
     Su et al., IEEE Trans. Instrum. Meas. 2024, doi 10.1109/TIM.2024.3375962, equation (2).
+
+    Examples
+    --------
+    >>> channel = MhdChannel(fluid="mercury", height=15e-3, field=0.448)
+    >>> abs(channel.response([0.01, 1.0, 100.0])).round(3)
+    array([0.004, 0.373, 0.998])
     """
 
     fluid: NamedFluid
@@ -244,6 +248,12 @@ def one_mode_response(channel: MhdChannel, freq_hz: ArrayLike) -> ComplexArray:
     References
     ----------
     Su et al., IEEE Trans. Instrum. Meas. 2024, equation (4).
+
+    Examples
+    --------
+    >>> channel = MhdChannel(fluid="mercury", height=15e-3, field=0.448)
+    >>> abs(one_mode_response(channel, [1.0])).round(3)
+    array([0.377])
     """
     s = _laplace(freq_hz)
     response: ComplexArray = s / (s + _one_mode_rate(channel))

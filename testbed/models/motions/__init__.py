@@ -11,3 +11,14 @@ MOTIONS = {
     "sine": "testbed.models.motions.sine:Sine",
     "static": "testbed.models.motions.static:Static",
 }
+
+
+def list_motions() -> list[str]:
+    """Return the names of the motions that a scenario may command.
+
+    Examples
+    --------
+    >>> "sine" in list_motions()
+    True
+    """
+    return sorted(MOTIONS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class Chirp(Motion):
-    r"""Sine of constant rate amplitude whose frequency runs from `start_frequency` f0 to `stop_frequency` f1 over the
-    sweep time T.
+    r"""Sine of constant rate amplitude whose frequency runs from a first to a last.
 
+    From `start_frequency` f0 to `stop_frequency` f1 over the sweep time T;
     linear: :math:`f(t) = f_0 + (f_1 - f_0) t/T`; logarithmic: :math:`f(t) = f_0 (f_1/f_0)^{t/T}`; the rate is
     :math:`a \sin(2\pi \int_0^t f)`. After T it stays at f1 with continuous phase.
 
@@ -39,6 +39,8 @@ class Chirp(Motion):
     ValueError
         If both frequencies are equal.
     """
+
+    example: ClassVar[dict[str, Any]] = {"start_frequency": "1 Hz", "stop_frequency": "20 Hz", "rate": "1 deg/s"}
 
     start_frequency: Frequency
     stop_frequency: Frequency

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 
 class Multisine(Motion):
-    r"""Sum of n sines of equal amplitude, :math:`\sum_i a_i \sin(2\pi f_i t + \varphi_i)`.
+    r"""Sum of sines of equal amplitude with a low crest factor.
 
+    :math:`\sum_i a_i \sin(2\pi f_i t + \varphi_i)` with n frequencies.
     Schroeder's phases :math:`\varphi_i = -\pi i (i - 1)/n` (i = 1 ... n) keep the crest factor low (M. Schroeder, IEEE
     Trans. Inf. Theory, 1970).
 
@@ -38,6 +39,8 @@ class Multisine(Motion):
     ValueError
         If neither or both amplitudes are given or a frequency is repeated.
     """
+
+    example: ClassVar[dict[str, Any]] = {"frequencies": ["1 Hz", "3 Hz"], "rate": "1 deg/s"}
 
     frequencies: Annotated[tuple[Frequency, ...], Field(min_length=1)]
     rate: Rate | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 class Random(Motion):
-    r"""Gaussian random rate with the constant two-sided density `psd` for `low` <= |f| <= `high` and nothing outside.
+    r"""Gaussian random rate with the constant two-sided density in a band and nothing outside.
+
+    The density is `psd` for `low` <= |f| <= `high`.
 
     One realisation of `testbed.models.turntable.realisation.gaussian_rate`; the variance is 2 S (high - low).
 
@@ -32,6 +34,8 @@ class Random(Motion):
     ValueError
         If `high` is not above `low`.
     """
+
+    example: ClassVar[dict[str, Any]] = {"psd": "1e-3 (deg/s)^2/Hz", "low": "10 Hz", "high": "50 Hz"}
 
     psd: RatePsd
     low: Frequency

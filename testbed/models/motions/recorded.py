@@ -1,13 +1,12 @@
-"""Motion read from a CSV file."""
+"""Motion read from a recording."""
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
-import math
+import re
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -15,23 +14,43 @@ from scipy.interpolate import CubicSpline
 
 from testbed import units
 from testbed.errors import Problem, ScenarioError
+from testbed.inputs.files import read_bytes
+from testbed.logs.clock import NANO
+from testbed.logs.formats import open_table
+from testbed.logs.logmap import ChannelMap, TimeMap
+from testbed.logs.options import refusal
+from testbed.logs.plan import plan
+from testbed.logs.reader import read_plans
 from testbed.models.motion import Motion, RateFunction
 from testbed.parts import Part
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from typing import Self
 
+    from testbed.logs.channel import LogChannel
     from testbed.signals import FloatArray
 
 _JITTER = 1e-3
 _BAND_POWER = 1e-6
+_MOST_BYTES = 1 << 25
+_ECHO = re.compile(r"""; the header has|, got ['"]|: ['"]""")
 
 
 def _beside_scenario(path: Path, info: ValidationInfo) -> Path:
-    """Take a relative path from the scenario's folder, not from where the command is typed."""
-    folder = (info.context or {}).get("folder")
-    return (Path(folder) / path).resolve() if folder else path
+    """Take a relative path from the scenario's folder, not from where the command is typed, and stay in there."""
+    context = info.context or {}
+    if not context.get("folder"):
+        return path
+    folder = Path(context["folder"]).resolve()
+    try:
+        place = (folder / path).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        msg = "expected a path"
+        raise ValueError(msg) from error
+    if not place.is_relative_to(folder) and not context.get("allow_outside"):
+        msg = "expected a file in the scenario's folder; --allow-outside (allow_outside=True) lets it read others"
+        raise ValueError(msg)
+    return place
 
 
 class Column(Part):
@@ -40,7 +59,7 @@ class Column(Part):
     Parameters
     ----------
     column : str
-        Its name in the header line.
+        Its name in the header, or its number from 1 on.
     unit : str
         Unit of its numbers.
     """
@@ -50,14 +69,15 @@ class Column(Part):
 
 
 class Recorded(Motion):
-    """Rate measured elsewhere, from a CSV file with a header line, joined by a cubic spline (continuous acceleration).
+    """Rate measured elsewhere, from a recording of any format, joined by a cubic spline (continuous acceleration).
 
-    Uneven or missing samples are refused with their line: a step may differ from the median step by 0.1 %.
+    Uneven or missing samples are refused with their line: a step may differ from the usual one by 0.1 % and what the
+    stamps are rounded to.
 
     Parameters
     ----------
     file : Path
-        The CSV file; relative to the scenario.
+        The recording; relative to the scenario.
     time, rate : Column
         Name and unit of both columns.
     sha256 : str, optional
@@ -67,8 +87,15 @@ class Recorded(Motion):
     Raises
     ------
     ScenarioError
-        If the file cannot be read, a value is missing or not finite, or the samples are uneven.
+        If the file cannot be read or is larger than 32 MiB, a value is missing or not finite, or the samples are
+        uneven.
     """
+
+    example: ClassVar[dict[str, Any]] = {
+        "file": "record.csv",
+        "time": {"column": "t", "unit": "s"},
+        "rate": {"column": "w", "unit": "deg/s"},
+    }
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column
@@ -117,56 +144,43 @@ class Recorded(Motion):
 
     def _read(self) -> tuple[FloatArray, FloatArray]:
         """Return time [s] and rate [rad/s], even and finite."""
-        lines: list[int] = []
-        rows: list[tuple[float, float]] = []
+        self._content()
+        time = TimeMap(column=self.time.column, unit=self.time.unit)
+        mapped = ChannelMap(column=self.rate.column, unit=self.rate.unit, kind="rate", time=time)
         try:
-            for line, pair in self._rows(io.StringIO(self._content().decode("utf-8-sig"), newline="")):
-                lines.append(line)
-                rows.append(pair)
-        except (UnicodeDecodeError, csv.Error) as error:
-            self._refuse(f"cannot be read: {error}")
-        if len(rows) < 4:
-            self._refuse(f"expected at least 4 samples, got {len(rows)}")
-        t, rate = np.array(rows).T
-        step = float(np.median(np.diff(t)))
-        uneven = np.flatnonzero(~(np.abs(np.diff(t) - step) <= _JITTER * abs(step))) if step > 0 else np.array([0])
-        if uneven.size:
-            i = int(uneven[0])
-            self._refuse(
-                (
-                    f"uneven or missing sample: time goes from {t[i]:g} s to {t[i + 1]:g} s where the usual step is "
-                    f"{step:g} s; resample the record"
-                ),
-                lines[i + 1],
-            )
-        return t, rate
+            table = open_table(self.file)
+            channel = read_plans([plan("rate", mapped, table, lambda field: field.partition(".")[0])])["rate"]
+            rate = channel.whole()
+        except ScenarioError as error:
+            raise ScenarioError([_discreet(problem) for problem in error.problems]) from error
+        _refuse_jitter(channel)
+        return np.arange(rate.size) / channel.rate_hz, rate
 
     def _content(self) -> bytes:
-        try:
-            content = self.file.read_bytes()
-        except OSError as error:
-            self._refuse(f"cannot be read: {error}")
+        content = read_bytes(self.file, _MOST_BYTES, "a record")
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in {None, found}:
-            self._refuse(f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since")
+            message = f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since"
+            raise refusal(self.file, message)
         return content
 
-    def _rows(self, stream: Any) -> Iterator[tuple[int, tuple[float, float]]]:
-        reader = csv.DictReader(stream)
-        names = reader.fieldnames or []
-        for column in (self.time.column, self.rate.column):
-            if column not in names:
-                self._refuse(f"no column {column!r}; the header has {', '.join(map(repr, names)) or 'nothing'}", 1)
-        second = units.parse(f"1 {self.time.unit}", "s")
-        radian = units.parse(f"1 {self.rate.unit}", "rad/s")
-        for row in reader:
-            try:
-                pair = float(row[self.time.column]) * second, float(row[self.rate.column]) * radian
-            except (TypeError, ValueError):
-                self._refuse("expected a number in both columns", reader.line_num)
-            if not all(map(math.isfinite, pair)):
-                self._refuse("expected finite numbers", reader.line_num)
-            yield reader.line_num, pair
 
-    def _refuse(self, message: str, line: int | None = None) -> NoReturn:
-        raise ScenarioError([Problem(message, file=str(self.file), line=line)])
+def _discreet(problem: Problem) -> Problem:
+    """Return a finding without what else stands in the file: a scenario names it, so its reader may not know it."""
+    if problem.line is not None and "fields" not in problem.message:
+        return problem
+    return replace(problem, message=_ECHO.split(problem.message, maxsplit=1)[0])
+
+
+def _refuse_jitter(channel: LogChannel) -> None:
+    """Refuse steps that differ by more than a spline bears and the rounding of the stamps explains."""
+    assert channel.clock is not None
+    assert channel.stamps_ns is not None
+    steps, step = np.diff(channel.stamps_ns), channel.clock.step_ns
+    uneven = np.flatnonzero(np.abs(steps - step) > _JITTER * step + channel.clock.quantum_ns)
+    if uneven.size:
+        i = int(uneven[0])
+        start, stop = (NANO * float(channel.stamps_ns[k] - channel.stamps_ns[0]) for k in (i, i + 1))
+        place = f"time goes from {start:g} s to {stop:g} s after the start"
+        message = f"uneven or missing sample: {place} where the usual step is {NANO * step:g} s; resample the record"
+        raise refusal(channel.table.path, message, line=channel.table.line(i + 1))

@@ -47,6 +47,12 @@ class Disturbances:
         names = [model.actuator(i).name for i in range(model.nactuator)]
         self._column = {name: int(model.actuator_ctrladr[i]) for i, name in enumerate(names)}
 
+    @property
+    def columns(self) -> list[int]:
+        """Columns of the controls that it moves."""
+        none = np.zeros(1)
+        return sorted({column + i for column, *_ in self._inputs(none, none, none) for i in range(2)})
+
     def apply(self, control: FloatArray, start: int, angle: FloatArray, rate: FloatArray) -> None:
         """Fill in the columns of mounts and bearing.
 
@@ -116,7 +122,7 @@ def check_floor(parameters: TurntableParameters, sample_rate_hz: float) -> None:
     top = parameters.floor.top_frequency()
     if top >= sample_rate_hz / 2:
         msg = (
-            f"turntable: floor: expected frequencies below {sample_rate_hz / 2:g} Hz, half the base clock, got "
-            f"{top:g} Hz"
+            f"turntable: floor: expected frequencies below {sample_rate_hz / 2:g} Hz, "
+            f"half the base clock, got {top:g} Hz"
         )
         raise ScenarioError(msg)

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from testbed.models.turntable.earth import EarthRate
 from testbed.models.turntable.floor import Floor
 from testbed.parts import Part
+from testbed.signals import BASE_RATE_HZ
 from testbed.units import Angle, AngularDrag, Frequency, Inertia, Length, Mass, Position, Quantity, Torque
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ class Digital(Part):
     """
 
     encoder_bits: Annotated[int, Field(ge=8, le=40)] = 24
-    controller_rate: Frequency = 20000.0
+    controller_rate: Frequency = BASE_RATE_HZ
     velocity_filter: Frequency = 600.0
     ripple: tuple[Ripple, ...] = (Ripple(relative=0.005, periods=12),)
 
@@ -178,6 +179,10 @@ class TurntableParameters(Part):
     step : float or "auto"
         Integration step [s]; a whole part or multiple of the 50 us over which references are held, or `auto`: as long
         as the true rate stays within 1e-6 of its largest value, see `testbed.scenario.step_choice.choose_step`.
+    engine : {"mujoco", "modal", "auto"}
+        What plays the plant: MuJoCo's steps; the modes of its linearisation, exact over each hold (modes `servo` and
+        `ideal`, `testbed.models.turntable.modal`); or the modes where excerpts played by both agree to 1e-6 of the
+        largest rate, and MuJoCo elsewhere.
     gravity : float
         Acceleration of gravity [m/s^2].
     platform_mass : float
@@ -236,6 +241,7 @@ class TurntableParameters(Part):
 
     mode: Literal["servo", "digital", "ideal", "fixed"] = "servo"
     step: Step = 5e-5
+    engine: Literal["mujoco", "modal", "auto"] = "mujoco"
     gravity: Acceleration = 9.80665
     platform_mass: Mass = 400.0
     platform_inertia: Inertias = (24.0, 24.0, 45.0)

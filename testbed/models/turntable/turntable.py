@@ -14,8 +14,8 @@ from testbed.models.turntable import plant, servo, stepping
 from testbed.models.turntable.digital import DigitalLoop, check_loop
 from testbed.models.turntable.disturbances import Disturbances, check_floor
 from testbed.models.turntable.engine import Engine
-from testbed.models.turntable.parameters import Cogging, Mounting, TurntableParameters
-from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.modal import ModalEngine, check_modal
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -23,11 +23,10 @@ if TYPE_CHECKING:
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.earth import EarthRate
     from testbed.models.turntable.floor import FloorMotion
+    from testbed.models.turntable.parameters import Mounting, TurntableParameters
     from testbed.signals import FloatArray
 
     Poses = dict[str, tuple[FloatArray, FloatArray]]
-
-__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
 
 
 @dataclass(frozen=True)
@@ -92,28 +91,46 @@ class Turntable:
         Sensors whose cross rates and specific forces are wanted too.
     floor : FloorMotion, optional
         The realisation of `parameters.floor`; needed if that floor moves.
+    modal : bool, optional
+        Play the plant by the modes of its linearisation instead of MuJoCo's steps (`testbed.models.turntable.modal`).
 
     Raises
     ------
     ScenarioError
-        If the plant cannot be built, falls over, is too stiff for the step, or its digital servo is unstable.
+        If the plant cannot be built, falls over, is too stiff for the step, if its digital servo is unstable, or if
+        modes are asked for where they do not hold.
     ValueError
         If the floor moves and `floor` is not given.
+
+    Examples
+    --------
+    A tenth of a second of a 10 Hz swing, and what a sensor on the table feels of it.
+
+    >>> from testbed.models.motion import MotionProfile
+    >>> from testbed.models.turntable import Mounting, TurntableParameters
+    >>> motion = MotionProfile([lambda t: 0.01 * np.sin(20.0 * np.pi * t)], 0.0, BASE_RATE_HZ)
+    >>> table = Turntable(TurntableParameters(), {"gyro": Mounting()})
+    >>> truth = table.process(motion.process(2000))
+    >>> round(float(truth.sensor_rate["gyro"].max()), 3)
+    0.01
     """
 
     def __init__(
         self,
         parameters: TurntableParameters,
         mountings: Mapping[str, Mounting],
-        sample_rate_hz: float = 20000.0,
+        sample_rate_hz: float = BASE_RATE_HZ,
         *,
         substeps: int = 1,
         holds: int = 1,
         pose_stride: int = 400,
         exposed: Collection[str] = (),
         floor: FloorMotion | None = None,
+        modal: bool = False,
     ) -> None:
         self.parameters = parameters
+        if modal:
+            check_modal(parameters, exposed)
         self._dt = 1.0 / sample_rate_hz
         check_plant(parameters, sample_rate_hz, substeps, holds)
         self.model = plant.build(parameters, mountings, self._dt * holds / substeps, exposed)
@@ -123,11 +140,14 @@ class Turntable:
         self._substeps, self._holds, self._stride = substeps, holds, pose_stride
         self.lookahead = stepping.lookahead(holds) if parameters.mode != "fixed" else 0
         self._next: int | None = None
+        self._modal = modal
         self._engine: Engine | DigitalLoop | None = None
+        self._modes: ModalEngine | None = None
         self._long: stepping.LongSteps | None = None
         self._disturbances = (
             Disturbances(self.model, parameters, floor, sample_rate_hz) if parameters.has_plant else None
         )
+        self._address = self._modal_outputs() if modal else self._all_sensors()
         # The axis of each site on the table at angle 0: what turns with it in mode `fixed`.
         self._axes = {name: plant.rotation(self.model.site(name).quat)[:, 2] for name in (plant.AXIS, *mountings)}
 
@@ -160,7 +180,18 @@ class Turntable:
         self._next = command.start + command.n_time
         if self.parameters.mode == "fixed":
             return self._fixed(command)
-        return self._truth(command, self._simulate(command) if self._holds == 1 else self._leap(command, ahead))
+        if self._modal:
+            return self._by_modes(command)
+        rows = self._simulate(command) if self._holds == 1 else self._leap(command, ahead)
+        positions = rows[-command.start % self._stride :: self._stride, : self.model.nq]
+        return self._truth(command, rows, self._column("torque", rows), positions)
+
+    def _by_modes(self, command: CommandBlock) -> TruthBlock:
+        if self._modes is None:
+            self._modes = self._start_modes(*self._at_start(command))
+        control = self._control(command)
+        rows, positions = self._modes.advance(command.start, control)
+        return self._truth(command, rows, self._motor_torque(control, rows), positions)
 
     def _simulate(self, command: CommandBlock) -> FloatArray:
         if self._engine is None:
@@ -169,6 +200,22 @@ class Turntable:
         if isinstance(self._engine, DigitalLoop):
             return self._engine.advance(command.start, control, command.angle[:-1])
         return self._engine.advance(command.start, control)
+
+    def _all_sensors(self) -> dict[str, int]:
+        """Return where each sensor begins in a row of the engine."""
+        sensors = (self.model.sensor(i) for i in range(self.model.nsensor))
+        return {sensor.name: int(sensor.adr[0]) for sensor in sensors}
+
+    def _modal_outputs(self) -> dict[str, int]:
+        """Return the same for the few sensors that the truth is made of: of a rate its last component.
+
+        The rotor is rigid: what stands on it with the same tilt feels the same rate.
+        """
+        platform = ["q_platform_rz"] if self.parameters.has_plant else []
+        names = [f"q_{plant.SPINDLE}", "encoder_rate", *platform]
+        tilts = {plant.AXIS: (0.0, 0.0), **{name: one.misalignment for name, one in self._mountings.items()}}
+        places = {tilt: len(names) + i for i, tilt in enumerate(dict.fromkeys(tilts.values()))}
+        return {name: i for i, name in enumerate(names)} | {f"rate_{name}": places[tilts[name]] for name in tilts}
 
     def _leap(self, command: CommandBlock, ahead: CommandBlock | None) -> FloatArray:
         """Return the sensor rows of integration steps that span several holds."""
@@ -181,17 +228,18 @@ class Turntable:
             self._long = self._start_long(command, control)
         rows = self._long.advance(command.start, command.n_time, control)
         # The torque follows the held references also within a step.
-        entry = self.model.sensor("torque").adr[0]
-        rows[:, entry] = held[:, self._motor]
-        if self.parameters.mode != "ideal":
-            q, v = self._column(f"q_{plant.SPINDLE}", rows), self._column("encoder_rate", rows)
-            reference = held[:, self._motor : self._motor + 3]
-            rows[:, entry] = servo.motor_torque(self.parameters, reference, q, v)
+        rows[:, self._address["torque"]] = self._motor_torque(held, rows)
         return rows
 
-    def _truth(self, command: CommandBlock, rows: FloatArray) -> TruthBlock:
-        self._check_motor(command.start, self._column("torque", rows))
-        angles = rows[:, : self.model.nq]
+    def _motor_torque(self, held: FloatArray, rows: FloatArray) -> FloatArray:
+        """Return what the motor gives under held references, at the beginning of each step."""
+        if self.parameters.mode == "ideal":
+            return held[:, self._motor]
+        q, v = self._column(f"q_{plant.SPINDLE}", rows), self._column("encoder_rate", rows)
+        return servo.motor_torque(self.parameters, held[:, self._motor : self._motor + 3], q, v)
+
+    def _truth(self, command: CommandBlock, rows: FloatArray, torque: FloatArray, positions: FloatArray) -> TruthBlock:
+        self._check_motor(command.start, torque)
         yaw = self._column("q_platform_rz", rows) if self.parameters.has_plant else 0.0
         return TruthBlock(
             start=command.start,
@@ -199,8 +247,8 @@ class Turntable:
             angle=self._column(f"q_{plant.SPINDLE}", rows) + yaw,
             sensor_rate={name: self._rate(name, rows) for name in self._names},
             encoder_rate=self._column("encoder_rate", rows),
-            torque=self._column("torque", rows),
-            poses=self._poses(command.start, angles),
+            torque=torque,
+            poses=self._poses(positions),
             cross_rate={name: self._cross_rate(name, rows) for name in self._exposed},
             specific_force={name: self._columns(f"force_{name}", rows) for name in self._exposed},
         )
@@ -220,7 +268,7 @@ class Turntable:
             sensor_rate=felt,
             encoder_rate=rate,
             torque=np.zeros(command.n_time),
-            poses=self._poses(command.start, angle[:, None]),
+            poses=self._poses(angle[-command.start % self._stride :: self._stride, None]),
             cross_rate={name: cross for name, (cross, _) in surroundings.items()},
             specific_force={name: force for name, (_, force) in surroundings.items()},
         )
@@ -255,6 +303,13 @@ class Turntable:
             return DigitalLoop(self.model, data.qpos, qvel, self._substeps, self.parameters)
         return Engine(self.model, data.qpos, qvel, self._substeps)
 
+    def _start_modes(self, data: Any, qvel: FloatArray) -> ModalEngine:
+        entries = {i: self.model.sensor(name) for name, i in self._address.items()}
+        outputs = [int(entries[i].adr[0] + entries[i].dim[0]) - 1 for i in sorted(entries)]
+        inputs = [self._motor + i for i in range(3 if self.parameters.mode == "servo" else 1)]
+        inputs += [] if self._disturbances is None else self._disturbances.columns
+        return ModalEngine(self.model, data, qvel, inputs, outputs, self.parameters, self._dt, self._stride)
+
     def _at_start(self, command: CommandBlock) -> tuple[Any, FloatArray]:
         """Return the table in its equilibrium at the commanded angle, and its first velocities."""
         parameters, angle = self.parameters, command.angle[0]
@@ -273,7 +328,8 @@ class Turntable:
         return data, qvel
 
     def _control(self, command: CommandBlock) -> FloatArray:
-        control = np.zeros((command.n_time, self.model.nu))
+        # Column by column in memory: what no input moves is never touched.
+        control = np.zeros((self.model.nu, command.n_time)).T
         parameters = self.parameters
         if parameters.mode == "ideal":
             control[:, self._motor] = servo.exact_torque(parameters, command.rate, self._dt)
@@ -291,7 +347,7 @@ class Turntable:
         """Return the inertial rate about the z axis of a site, the Earth's included where it is asked for."""
         rate = self._column(f"rate_{site}", rows)
         if self.parameters.earth_rate is not None:
-            first = self.model.sensor(f"axis_{site}").adr[0]
+            first = self._address[f"axis_{site}"]
             rate += _along(self.parameters.earth_rate, rows[:, first : first + 3].T)
         return rate
 
@@ -305,20 +361,19 @@ class Turntable:
 
     def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
         """Return the last component of a sensor: the value of a scalar, the z of an angular velocity."""
-        entry = self.model.sensor(sensor)
-        return rows[:, entry.adr[0] + entry.dim[0] - 1].copy()
+        last = 0 if self._modal else int(self.model.sensor(sensor).dim[0]) - 1
+        return rows[:, self._address[sensor] + last].copy()
 
     def _columns(self, sensor: str, rows: FloatArray) -> FloatArray:
         """Return all components of a sensor, shape (n_time, n_component)."""
-        entry = self.model.sensor(sensor)
-        return rows[:, entry.adr[0] : entry.adr[0] + entry.dim[0]].copy()
+        first = self._address[sensor]
+        return rows[:, first : first + int(self.model.sensor(sensor).dim[0])].copy()
 
-    def _poses(self, start: int, qpos: FloatArray) -> Poses:
-        """Return where the bodies are at the pose samples, from joint positions, shape (n_time, nq)."""
-        picked = qpos[-start % self._stride :: self._stride]
+    def _poses(self, positions: FloatArray) -> Poses:
+        """Return where the bodies are, from joint positions at the pose samples, shape (n_pose, nq)."""
         ids = [self.model.body(name).id for name in plant.BODIES]
-        places, turns = np.empty((len(picked), len(ids), 3)), np.empty((len(picked), len(ids), 4))
-        for i, q in enumerate(picked):
+        places, turns = np.empty((len(positions), len(ids), 3)), np.empty((len(positions), len(ids), 4))
+        for i, q in enumerate(positions):
             self._data.qpos[:] = q
             mujoco.mj_kinematics(self.model, self._data)
             places[i], turns[i] = self._data.xpos[ids], self._data.xquat[ids]

@@ -14,9 +14,9 @@ import numpy as np
 from testbed.judging.budget import signal_optima
 from testbed.metrics.errors import ErrorMetrics, floor_rmse
 from testbed.reproduce.paper1.defects import table_ii_defects
-from testbed.reproduce.paper1.runs import BASE_HZ, FILTERS, SIGNALS, Protocol, errors, outputs, presets, truth
+from testbed.reproduce.paper1.runs import FILTERS, SIGNALS, FusionProtocol, errors, outputs, presets, truth
 from testbed.runs.atomic import write_text
-from testbed.signals import sample_times
+from testbed.signals import BASE_RATE_HZ, sample_times
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -56,7 +56,7 @@ COLUMNS = (
 BANDWIDTH_HZ = 1000.0
 
 
-def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[str]:
+def report(seeds: int, out: Path, protocol: FusionProtocol | None = None) -> Iterator[str]:
     """Write both tables and all figures, and yield the tables and what was written, line by line.
 
     Parameters
@@ -65,7 +65,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
         Seeds 1 to this [-].
     out : Path
         Folder to write to.
-    protocol : Protocol, optional
+    protocol : FusionProtocol, optional
         Twenty seconds, judged from the tenth on, if not given.
 
     Yields
@@ -76,7 +76,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
     # Drawing is slow to import and nothing else here needs it.
     from testbed.reproduce.paper1.figures import write_figures
 
-    protocol = protocol or Protocol()
+    protocol = protocol or FusionProtocol()
     yield f"moving the turntable: {', '.join(SIGNALS)}"
     rates = {signal: truth(signal, protocol) for signal in SIGNALS}
     yield from table_ii(rates, seeds, out, protocol)
@@ -84,7 +84,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
     yield from write_figures(rates, out, protocol)
 
 
-def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: Protocol) -> Iterator[str]:
+def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: FusionProtocol) -> Iterator[str]:
     """Write table_ii.csv and yield it line by line: medians over the seeds, lowest and highest RMSE, the paper's
     number, floor and optimum.
 
@@ -98,7 +98,7 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
         Seeds 1 to this [-].
     out : Path
         Folder to write to.
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of a run.
 
     Yields
@@ -124,12 +124,12 @@ def table_ii(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: P
     write_text(out / "table_ii.csv", f"signal,name,{','.join(COLUMNS)}\n{text}\n")
 
 
-def _bounds(rates: Mapping[str, FloatArray], protocol: Protocol) -> dict[str, tuple[float, float]]:
+def _bounds(rates: Mapping[str, FloatArray], protocol: FusionProtocol) -> dict[str, tuple[float, float]]:
     """Return floor and optimum of each signal [deg/s], of its lines as they are in the truth after settle."""
-    sensors, first, lines = presets(), round(protocol.settle * BASE_HZ), []
+    sensors, first, lines = presets(), round(protocol.settle * BASE_RATE_HZ), []
     for signal, rate in rates.items():
         judged = ErrorMetrics([sine.frequency for sine in SIGNALS[signal]])
-        judged.add(sample_times(first, rate.size - first, BASE_HZ), rate[first:], rate[first:])
+        judged.add(sample_times(first, rate.size - first, BASE_RATE_HZ), rate[first:], rate[first:])
         lines.append(judged.truth_lines())
     floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
     best = signal_optima(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()}, lines)

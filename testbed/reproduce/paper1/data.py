@@ -12,7 +12,9 @@ import numpy as np
 
 from testbed.fusion.belief import default_belief
 from testbed.models.mhd_channel.channel import MhdChannel, one_mode_response
-from testbed.reproduce.paper1.runs import BASE_HZ, DEG, SIGNALS, Protocol, fuse, presets, read
+from testbed.reproduce.paper1.runs import SIGNALS, FusionProtocol, fuse, presets, sensor_readings
+from testbed.signals import BASE_RATE_HZ
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
@@ -90,7 +92,7 @@ def increment_formula(sensor: Sensor, freq_hz: FloatArray, amplitude: float = DE
     """
     signal = (amplitude * np.abs(sensor.response(freq_hz)) * np.sin(np.pi * freq_hz / sensor.sample_rate)) ** 2
     # The noise enters at the base clock; of a slower sensor, more than half its own rate folds in.
-    f = np.linspace(0.25, 0.5 * BASE_HZ, 40_000)
+    f = np.linspace(0.25, 0.5 * BASE_RATE_HZ, 40_000)
     density = sensor.input_noise_psd(f) * np.abs(sensor.response(f)) ** 2
     noise = 2.0 * np.trapezoid(density * (1.0 - np.cos(2.0 * np.pi * f / sensor.sample_rate)), f)
     total: FloatArray = signal + noise
@@ -120,8 +122,8 @@ def _step(sensor: Sensor, freq_hz: float, seed: int) -> tuple[complex, float]:
         return complex(np.nan, np.nan), np.nan
     # The gyro's slow pole, 0.1 rad/s, has 4 % of the gain and has to settle where the sine is slow enough to excite it.
     settle, measure = (40.0 if freq_hz < 1.0 else 5.0), np.ceil(2.0 * freq_hz) / freq_hz
-    rate = DEG * np.sin(2.0 * np.pi * freq_hz * np.arange(round((settle + measure) * BASE_HZ)) / BASE_HZ)
-    readings = sensor.sample(rate, BASE_HZ, seed)
+    rate = DEG * np.sin(2.0 * np.pi * freq_hz * np.arange(round((settle + measure) * BASE_RATE_HZ)) / BASE_RATE_HZ)
+    readings = sensor.sample(rate, BASE_RATE_HZ, seed)
     first = round(settle * sensor.sample_rate)
     turns = 2.0 * np.pi * freq_hz * np.arange(first, readings.size) / sensor.sample_rate
     basis = np.stack([np.sin(turns), np.cos(turns), np.ones_like(turns)], axis=1)
@@ -129,7 +131,7 @@ def _step(sensor: Sensor, freq_hz: float, seed: int) -> tuple[complex, float]:
     return complex(in_phase, quadrature) / DEG, 0.5 * float(np.mean(np.diff(readings[first:]) ** 2))
 
 
-def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) -> dict[str, Table]:
+def following(rate: FloatArray, signal: str, protocol: FusionProtocol, seed: int = 1) -> dict[str, Table]:
     """Return the three tables of one signal's run: `rates` and `fused` over two periods (mixed: one), `adaptation` over
     the whole run.
 
@@ -143,19 +145,21 @@ def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) 
         True rate [rad/s].
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of the run.
     seed : int
         Seed of the noise.
     """
     sensors = presets()
-    readings = read(rate, seed, sensors)
+    readings = sensor_readings(rate, seed, sensors)
     blocks = fuse(readings, sensors)
     lines = [sine.frequency for sine in SIGNALS[signal]]
     length = min(2.0 / min(lines), 20.0 / max(lines))
     start = max(0.0, min(protocol.settle, protocol.duration - length))
-    shown = np.arange(round(start * BASE_HZ), round(min(start + length, protocol.duration) * BASE_HZ), WINDOW_STRIDE)
-    time, true = shown / BASE_HZ, rate[shown] / DEG
+    shown = np.arange(
+        round(start * BASE_RATE_HZ), round(min(start + length, protocol.duration) * BASE_RATE_HZ), WINDOW_STRIDE
+    )
+    time, true = shown / BASE_RATE_HZ, rate[shown] / DEG
     rates = {"time_s": time, "turntable_deg_s": true, "arw_shakf_deg_s": blocks["arw_shakf"].rate[shown] / DEG}
     for name, values in readings.items():
         rates[f"{name}_deg_s"] = values[shown // (rate.size // values.size)] / DEG
@@ -164,7 +168,7 @@ def following(rate: FloatArray, signal: str, protocol: Protocol, seed: int = 1) 
     fused |= {f"{name}_error_deg_s": fused[f"{name}_deg_s"] - true for name in FOLLOWERS}
     # Logarithmic in time, at readings of the gyro, so that every value is defined.
     picked = WINDOW_STRIDE * np.unique(np.round(np.geomspace(1, rate.size // WINDOW_STRIDE - 1, 600)).astype(int))
-    adaptation = {"time_s": picked / BASE_HZ}
+    adaptation = {"time_s": picked / BASE_RATE_HZ}
     for name in FOLLOWERS:
         known = blocks[name].diagnostics
         shown_here = [f"{what}_{sensor}" for what in "RN" for sensor in sensors if f"{what}_{sensor}" in known]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.reproduce.paper1.runs import FILTERS, Protocol, errors, outputs, presets
+from testbed.reproduce.paper1.runs import FILTERS, FusionProtocol, errors, outputs, presets
 from testbed.runs.atomic import write_text
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Split:
         return rmse, *spread, self.belief, noise, self.closure, rmse - before, *parts
 
 
-def split(rate: FloatArray, signal: str, case: str, seeds: int, protocol: Protocol) -> dict[str, Split]:
+def split(rate: FloatArray, signal: str, case: str, seeds: int, protocol: FusionProtocol) -> dict[str, Split]:
     """Return the error of every filter in one case, split.
 
     Parameters
@@ -130,7 +130,7 @@ def split(rate: FloatArray, signal: str, case: str, seeds: int, protocol: Protoc
         One of `CASES`.
     seeds : int
         Seeds 1 to this [-].
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of a run.
     """
     quiet = outputs(rate, 0, sensors_of(case, noise=False))
@@ -151,7 +151,7 @@ def split(rate: FloatArray, signal: str, case: str, seeds: int, protocol: Protoc
     }
 
 
-def table_ii_defects(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: Protocol) -> Iterator[str]:
+def table_ii_defects(rates: Mapping[str, FloatArray], seeds: int, out: Path, protocol: FusionProtocol) -> Iterator[str]:
     """Write table_ii_defects.csv and yield it line by line: for every filter its RMSE, and the belief and noise part of
     it.
 
@@ -163,7 +163,7 @@ def table_ii_defects(rates: Mapping[str, FloatArray], seeds: int, out: Path, pro
         Seeds 1 to this; medians over them [-].
     out : Path
         Folder to write to.
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of a run.
 
     Yields
@@ -192,6 +192,6 @@ def _cell(found: Split) -> str:
     return f"{rmse:.1f} ({1e3 * found.belief:.1f}, {noise:.1f})"
 
 
-def _rms_deg(difference: FloatArray, n_time: int, protocol: Protocol) -> float:
+def _rms_deg(difference: FloatArray, n_time: int, protocol: FusionProtocol) -> float:
     settled = difference[round(protocol.settle / protocol.duration * n_time) :]
     return float(np.rad2deg(np.sqrt(np.mean(settled**2))))

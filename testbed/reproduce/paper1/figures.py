@@ -1,4 +1,4 @@
-"""The figures of paper 1, drawn at the width of a journal's column from the tables of `paper1_data`."""
+"""The figures of paper 1, drawn at the width of a journal's column from the tables of its `data`."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from testbed.reproduce.drawing import (
     smooth,
 )
 from testbed.reproduce.paper1.data import FOLLOWERS, bode, csv_text, following, increments, slip_error, stepped_sine
-from testbed.reproduce.paper1.runs import DEG, FILTERS, SENSORS
+from testbed.reproduce.paper1.runs import FILTERS, SENSORS
 from testbed.runs.atomic import write_text
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from testbed.reproduce.paper1.data import Table
-    from testbed.reproduce.paper1.runs import Protocol
+    from testbed.reproduce.paper1.runs import FusionProtocol
     from testbed.signals import FloatArray
 
 SMOOTH_S = 20e-3
@@ -62,7 +63,7 @@ RUNS = {
 }
 
 
-def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: Protocol) -> Iterator[str]:
+def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: FusionProtocol) -> Iterator[str]:
     """Write every figure as SVG and PNG beside the tables that it shows, and yield a line for each.
 
     Parameters
@@ -71,7 +72,7 @@ def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: Protocol
         True rate of each signal [rad/s].
     out : Path
         Folder to write to.
-    protocol : Protocol
+    protocol : FusionProtocol
         Times of a run.
 
     Yields

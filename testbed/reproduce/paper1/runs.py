@@ -17,9 +17,11 @@ from testbed.fusion import estimate
 from testbed.metrics.errors import ErrorMetrics
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.sensors import load_preset
-from testbed.signals import random_stream, sample_times
+from testbed.signals import BASE_RATE_HZ, random_stream, sample_times
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
-BASE_HZ = 20_000.0
-DEG = np.pi / 180.0
 SENSORS = {"mems_gyro": "adis16505_filtered", "mhd_ars": "sx300"}
 FILTERS = ("kalman", "shakf", "arw_shakf", "arw_shakf_literal")
 SIGNALS = {
@@ -41,7 +41,7 @@ SIGNALS = {
 
 
 @dataclass(frozen=True)
-class Protocol:
+class FusionProtocol:
     """Times of a run [s]: its length, and where the metrics start.
 
     Parameters
@@ -59,23 +59,23 @@ def presets() -> dict[str, Sensor]:
     return {name: load_preset(preset) for name, preset in SENSORS.items()}
 
 
-def truth(signal: str, protocol: Protocol) -> FloatArray:
+def truth(signal: str, protocol: FusionProtocol) -> FloatArray:
     """Return the inertial rate of the table under its servo [rad/s], shape (n_time,), at 20 kHz.
 
     Parameters
     ----------
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Its length.
     """
     terms = [sine.start(protocol.duration, random_stream(0, "motion")) for sine in SIGNALS[signal]]
-    table = Turntable(TurntableParameters(), {"mhd_ars": Mounting()}, BASE_HZ)
-    motion, seconds = MotionProfile(terms, 0.5, BASE_HZ), round(protocol.duration)
-    return np.concatenate([table.process(motion.process(round(BASE_HZ))).rate for _ in range(seconds)])
+    table = Turntable(TurntableParameters(), {"mhd_ars": Mounting()}, BASE_RATE_HZ)
+    motion, seconds = MotionProfile(terms, 0.5, BASE_RATE_HZ), round(protocol.duration)
+    return np.concatenate([table.process(motion.process(round(BASE_RATE_HZ))).rate for _ in range(seconds)])
 
 
-def read(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
+def sensor_readings(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
     """Return the readings of the sensors [rad/s], each at its own rate.
 
     Parameters
@@ -87,7 +87,7 @@ def read(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str
     sensors : mapping of str to Sensor
         Instruments by name.
     """
-    return {name: sensor.start(BASE_HZ, seed, name).process(rate) for name, sensor in sensors.items()}
+    return {name: sensor.start(BASE_RATE_HZ, seed, name).process(rate) for name, sensor in sensors.items()}
 
 
 def fuse(readings: Mapping[str, FloatArray], sensors: Mapping[str, Sensor]) -> dict[str, EstimateBlock]:
@@ -106,12 +106,12 @@ def fuse(readings: Mapping[str, FloatArray], sensors: Mapping[str, Sensor]) -> d
 
 def outputs(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:
     """Return the rates [rad/s] of the sensors and of the filters, each at its own rate; arguments as `read`."""
-    readings = read(rate, seed, sensors)
+    readings = sensor_readings(rate, seed, sensors)
     return readings | {name: block.rate for name, block in fuse(readings, sensors).items()}
 
 
 def errors(
-    found: Mapping[str, FloatArray], rate: FloatArray, signal: str, protocol: Protocol
+    found: Mapping[str, FloatArray], rate: FloatArray, signal: str, protocol: FusionProtocol
 ) -> dict[str, tuple[float, float]]:
     """Return complex and aligned RMSE [deg/s] of every rate.
 
@@ -123,15 +123,15 @@ def errors(
         True rate at 20 kHz [rad/s].
     signal : str
         One of `SIGNALS`.
-    protocol : Protocol
+    protocol : FusionProtocol
         Its times.
     """
     lines = [sine.frequency for sine in SIGNALS[signal]]
     judged = {}
     for name, values in found.items():
         stride = rate.size // values.size
-        metrics, first = ErrorMetrics(lines), round(protocol.settle * BASE_HZ / stride)
-        t = sample_times(first, values.size - first, BASE_HZ / stride)
+        metrics, first = ErrorMetrics(lines), round(protocol.settle * BASE_RATE_HZ / stride)
+        t = sample_times(first, values.size - first, BASE_RATE_HZ / stride)
         metrics.add(t, values[first:], rate[::stride][first:])
         result = metrics.result()
         judged[name] = result["rmse_deg_s"], result["rmse_aligned_deg_s"]

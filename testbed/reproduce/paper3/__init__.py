@@ -17,11 +17,11 @@ from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
 from testbed.compensation.record import Record
-from testbed.drift.leak import audit
+from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
-from testbed.drift.quality import low_pass
+from testbed.drift.quality import smoothed
 from testbed.drift.records import ThermalRecord
-from testbed.drift.summary import summary
+from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
@@ -83,7 +83,7 @@ PAPER_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Protocol:
+class DriftProtocol:
     """How much of the paper's protocol to run.
 
     Parameters
@@ -137,14 +137,14 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
     return ThermalRecord(f"{programme}, seed {seed}", Record(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
-def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
+def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
     """Yield the rows of the table for one seed, each trained when it is its turn.
 
     Parameters
     ----------
     seed : int
         Of the noise; the training cycles have seeds of their own.
-    protocol : Protocol
+    protocol : DriftProtocol
         Its numbers.
     """
     fs = protocol.sample_rate_hz
@@ -154,7 +154,7 @@ def cases(seed: int, protocol: Protocol) -> Iterator[Case]:
     yield Case(
         "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
     )
-    yield Case("low-pass of 300 s", "-", lambda record: low_pass(record.rate, fs, 1.0 / 300.0))
+    yield Case("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
@@ -178,7 +178,7 @@ def _applied(model: DriftModel) -> Compensate:
     return lambda record: model.apply(record).rate
 
 
-def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[str]:
+def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iterator[str]:
     """Write table_2.csv, paper3.html and the audits of the first seed, and yield the table line by line.
 
     Parameters
@@ -187,7 +187,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
         Seeds 1 to this, of which each figure is the median [-].
     out : Path
         Folder to write to.
-    protocol : Protocol, optional
+    protocol : DriftProtocol, optional
         The paper's record at 1 Hz, if not given.
 
     Yields
@@ -195,7 +195,7 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
     str
         One line.
     """
-    protocol = protocol or Protocol()
+    protocol = protocol or DriftProtocol()
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     folders: dict[str, str] = {}
     audits: dict[str, Audit] = {}
@@ -203,7 +203,9 @@ def report(seeds: int, out: Path, protocol: Protocol | None = None) -> Iterator[
         thermal = cycle("paper", seed, protocol.sample_rate_hz)
         for case in cases(seed, protocol):
             audited, seconds = _audited(case, thermal)
-            found.setdefault((case.name, case.trained_on), []).append({**summary(audited.audit), "seconds": seconds})
+            found.setdefault((case.name, case.trained_on), []).append(
+                {**audit_summary(audited.audit), "seconds": seconds}
+            )
             yield (
                 f"seed {seed}: {case.name}, trained on {case.trained_on}: "
                 f"{'leak' if audited.audit.leaks else 'no leak found'}"
@@ -229,7 +231,7 @@ def _audited(case: Case, thermal: ThermalRecord) -> tuple[Audited, float]:
     begin = time.perf_counter()
     plain = case.compensate(thermal.record)
     seconds = time.perf_counter() - begin
-    found = audit(case.compensate, thermal.record, plain, thermal.drift)
+    found = find_leaks(case.compensate, thermal.record, plain, thermal.drift)
     return Audited(f"{case.name}, trained on {case.trained_on}", thermal, plain, found), seconds
 
 
@@ -283,7 +285,7 @@ def _printed(
 ) -> Iterator[str]:
     yield (
         f"Table 2 on our data, median over {seeds} seed(s); B in deg/h, N in deg/sqrt(h), none where the noise "
-        f"model does not describe the curve"
+        "model does not describe the curve"
     )
     heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks")
     yield f"{'method':20s}{'trained on':18s}" + "".join(f"{head:>11s}" for head in heads)

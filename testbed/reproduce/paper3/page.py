@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from testbed.drift.figures import SIZE_IN, allan_figure
+from testbed.drift.figures import SIZE_IN, residual_allan_figure
 from testbed.drift.leak import DRIFT_PERIOD, LEAST_GAIN
 from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH
 from testbed.pages.svg import STYLE
@@ -52,7 +52,7 @@ def page(rows: Sequence[Mapping[str, Any]], audits: Mapping[str, Audit], folders
     if oracle is not None:
         qualities["oracle"] = oracle
     drawn = {
-        "allan": allan_figure(qualities, {**styles, "oracle": (TRUTH, (0, (1.2, 1.6)))}),
+        "allan": residual_allan_figure(qualities, {**styles, "oracle": (TRUTH, (0, (1.2, 1.6)))}),
         "gain": _gain_figure(audits, styles),
     }
     return render("paper3.html.j2", drawn, rows=rows, seeds=seeds, folders=folders)

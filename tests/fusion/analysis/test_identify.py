@@ -35,6 +35,28 @@ def test_a_resonance_is_found_by_a_pole_pair() -> None:
     np.testing.assert_allclose(fit.belief().realisation().response(FREQ), transfer(b, a, FREQ), rtol=1e-6)
 
 
+@pytest.mark.parametrize(("real", "pairs"), [(1, 0), (5, 0), (4, 2), (3, 2), (5, 1), (0, 3)])
+@pytest.mark.parametrize("blind", [True, False])
+def test_more_poles_than_there_are_do_no_harm(real: int, pairs: int, blind: bool) -> None:
+    """Poles without a task wander to infinity or to zero; the fit stays, no worse than that of two poles."""
+    name = "mhd_ars" if blind else "mems_gyro"
+    b, a = (np.array(part) for part in (default_belief()[name].numerator, default_belief()[name].denominator))
+    # A wall's layer on top, which no rational model meets: half-order, 1 % of it.
+    H = transfer(b, a, FREQ) * (1.0 + 0.01 * np.sqrt(2j * np.pi * FREQ / 1e4))
+    two = identify(FREQ, H, real_poles=2, blind_at_dc=blind)
+    fit = identify(FREQ, H, real_poles=real, pole_pairs=pairs, blind_at_dc=blind)
+    assert np.isfinite([*fit.numerator, *fit.denominator]).all()
+    if real + 2 * pairs > 1:
+        assert fit.worst <= 1.001 * two.worst
+
+
+def test_no_zero_is_made_of_rounding() -> None:
+    """A low-pass of two poles has no zero; one at 1e18 rad/s would spoil its inverse."""
+    w = 2.0 * np.pi * 480.0
+    H = transfer(np.array([w**2]), np.array([1.0, 2.0**0.5 * w, w**2]), FREQ)
+    np.testing.assert_array_equal(identify(FREQ, H, real_poles=0, pole_pairs=1).numerator[:-1], 0.0)
+
+
 def test_weight_decides_where_the_fit_is_good() -> None:
     """Two poles cannot carry three; weighting the upper half makes the upper half better and the lower worse."""
     w = 2.0 * np.pi * np.array([1.0, 20.0, 300.0])

@@ -14,8 +14,9 @@ from testbed.errors import RunError, ScenarioError
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import plant, servo
 from testbed.models.turntable.earth import EarthRate
-from testbed.models.turntable.parameters import Digital, Wobble
-from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters, required_torque
+from testbed.models.turntable.parameters import Digital, Mounting, TurntableParameters, Wobble
+from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.turntable import TruthBlock, Turntable
 from testbed.parts import preset
 
 FS = 20000.0
@@ -420,9 +421,9 @@ OTHER_VALUES = {
     "wobble": (Wobble(axis="ry", angle=1e-6, periods=2),),
     "earth_rate": EarthRate(latitude=0.8),
 }
-# Shown elsewhere: the modes and the step in tests of their own, the height of the sensors in the picture, the limit
-# when it is reached.
-ELSEWHERE = {"mode", "step", "mounting_height", "torque_limit", "floor"}
+# Shown elsewhere: the modes, the step and the engine in tests of their own, the height of the sensors in the picture,
+# the limit when it is reached.
+ELSEWHERE = {"mode", "step", "engine", "mounting_height", "torque_limit", "floor"}
 
 
 def test_other_values_cover_every_parameter() -> None:

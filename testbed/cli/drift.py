@@ -1,0 +1,91 @@
+"""Drift compensation on the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from testbed.drift.summary import LETTERS, audit_summary
+from testbed.pages.numbers import significant
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from testbed.drift.page import Audited
+
+
+def print_training(found: Mapping[str, Any]) -> None:
+    """Print what was trained, and where the model is."""
+    error = f"error of the cross-validation {found['blocked_error_deg_h']:.4g} deg/h, noise of the means included"
+    _print(f"method {found['method']}, {len(found['cycles'])} cycles; {error}", found)
+
+
+def print_application(found: Mapping[str, Any]) -> None:
+    """Print how far a model had to be extrapolated, and where the compensated record is."""
+    _print(f"{found['extrapolated']:.2%} of the samples outside the trained range", found)
+
+
+def _print(line: str, found: Mapping[str, Any]) -> None:
+    console = Console(soft_wrap=True)
+    console.print(line, highlight=False)
+    console.print(f"wrote {found['written']}", highlight=False)
+
+
+def print_audit(audited: Audited, folder: Path) -> None:
+    """Print the findings of an audit.
+
+    Parameters
+    ----------
+    audited : Audited
+        The audit.
+    folder : Path
+        Where its page is.
+    """
+    console, figures = Console(soft_wrap=True), audit_summary(audited.audit)
+    table = Table("", "100 s std", "sigma 1 h", *LETTERS, title=f"{audited.thermal.name}: {audited.method}")
+    names = {"before": "record", "after": "compensated", "low_passed": "equal low-pass", "oracle": "oracle"}
+    for key, label in names.items():
+        if figures[key] is not None:
+            table.add_row(label, *_row(figures[key]))
+    console.print(table)
+    console.print("std and sigma in deg/h, Q in urad, N in deg/sqrt(h), B in deg/h; none where the noise model fails")
+    shown = {
+        "drift reduction": "drift_reduction",
+        "sigma at 1 h over the oracle's": "oracle_ratio_1h",
+        "100 s std over the oracle's": "block_std_over_oracle",
+        "bandwidth left [Hz]": "bandwidth_hz",
+        "least gain of a slow true rate": "least_gain_in_drift_band",
+        "gain of a step": "step_gain",
+        "gain of Earth-rate steps": "earth_rate_gain",
+    }
+    for label, key in shown.items():
+        if figures[key] is not None:
+            console.print(f"{label}: {significant(figures[key], 4)}")
+    if audited.extrapolated is not None:
+        console.print(f"outside the trained range: {audited.extrapolated:.2%} of the samples")
+    for leak in figures["leaks"]:
+        console.print(f"LEAK: {leak}", style="red")
+    console.print("verdict: " + ("no leak found" if figures["passed"] else "a leak; do not believe this result"))
+    console.print(f"wrote {folder / 'audit.html'}")
+
+
+def _row(quality: dict[str, object]) -> list[str]:
+    found = quality["coefficients"]
+    row = [
+        significant(quality[key])  # type: ignore[arg-type]
+        for key in ("block_std_100s_deg_h", "allan_deviation_1h_deg_h")
+    ]
+    if not isinstance(found, dict):
+        return [*row, *("-" for _ in LETTERS)]
+    return [
+        *row,
+        *(
+            f"< {significant(found[letter]['upper'])}"
+            if found[letter]["value"] is None
+            else significant(found[letter]["value"], 4)
+            for letter in LETTERS
+        ),
+    ]

@@ -1,0 +1,49 @@
+"""A scenario key by key: as written, and as understood in SI."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from testbed.judging.table_facts import TableFacts
+    from testbed.scenario.model import Scenario
+
+
+def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
+    """Return every key that has a value, by its dotted name: what was `written`, and what it means in `si`."""
+    written = {key: f"{_text(value)} (preset)" for key, value in _leaves(dict(scenario.presets))}
+    written |= {key: _text(value) for key, value in _leaves(dict(scenario.source))}
+    return {
+        key: {"written": written.get(key, ""), "si": _text(value)}
+        for key, value in _leaves(scenario.resolved())
+        if value not in ("", None)
+    }
+
+
+def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:
+    """Return what `testbed check` tells a program."""
+    return {
+        "scenario": scenario.name,
+        "file": str(scenario.file),
+        "keys": understood(scenario),
+        "datasheets": {name: dict(sensor.datasheet()) for name, sensor in scenario.sensors.items()},
+        "turntable": facts.summary(),
+    }
+
+
+def _text(value: Any) -> str:
+    return (", ".join(map(str, value)) or "none") if isinstance(value, list) else str(value)
+
+
+def _leaves(node: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, value) of every scalar, lists of scalars kept whole."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _leaves(value, f"{prefix}.{key}" if prefix else str(key))
+    elif isinstance(node, list) and any(isinstance(item, dict) for item in node):
+        for i, value in enumerate(node):
+            yield from _leaves(value, f"{prefix}.{i}")
+    else:
+        yield prefix, node

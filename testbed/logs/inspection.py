@@ -1,0 +1,256 @@
+"""What a recording holds, channel by channel: time, numbers, and everything that a user should know before using it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from testbed.logs.clock import NANO, ClockScan, Tally, TimeBase, resolution_ns
+from testbed.logs.reader import stamps_of, wrap_of
+from testbed.logs.values import Values, ValueScan, word_size
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from testbed.logs.channel import LogChannel
+    from testbed.logs.plan import Plan
+    from testbed.logs.table import Table
+
+_PLACES = 5
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong or odd.
+
+    Parameters
+    ----------
+    kind : str
+        ``gaps``, ``doubled``, ``backward``, ``uneven``, ``coarse``, ``wraps``, ``missing``, ``repeats``,
+        ``saturation``, ``rounding`` or ``rate``.
+    message : str
+        What, where, and what may be done.
+    """
+
+    kind: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a channel holds.
+
+    Parameters
+    ----------
+    plan : Plan
+        How it is read.
+    values : Values
+        Its numbers, in the unit of the file.
+    clock : TimeBase, optional
+        Its time base, where there are stamps.
+    findings : tuple of Finding
+        What is wrong or odd.
+    """
+
+    plan: Plan
+    values: Values
+    clock: TimeBase | None
+    findings: tuple[Finding, ...]
+
+
+def inspect(plans: Sequence[Plan]) -> list[Report]:
+    """Look at channels, block by block, so that memory does not grow with the file.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        From `plan.plan`.
+
+    Returns
+    -------
+    list of Report
+        One for each channel.
+
+    Raises
+    ------
+    ScenarioError
+        As `read_log`.
+    """
+    groups: dict[tuple[int, str, int | None], list[Plan]] = {}
+    for one in plans:
+        column = one.table.columns[one.value]
+        groups.setdefault((id(one.table), column.group, column.n_time), []).append(one)
+    found = {one.name: report for members in groups.values() for one, report in _inspect_group(members)}
+    return [found[one.name] for one in plans]
+
+
+def _inspect_group(plans: Sequence[Plan]) -> Iterator[tuple[Plan, Report]]:
+    table = plans[0].table
+    scans = [ValueScan() for _ in plans]
+    clocks: dict[tuple[int, float], ClockScan] = {}
+    stamps = {one.stamps for one in plans if one.stamps is not None}
+    row = 0
+    for block in table.blocks(list(dict.fromkeys([*(one.value for one in plans), *stamps])), stamps):
+        for one, scan in zip(plans, scans, strict=True):
+            scan.add(np.asarray(block[one.value], np.float64))
+        for column, unit in {(one.stamps, one.time_unit) for one in plans if one.stamps is not None}:
+            raw = block[column]
+            if (column, unit) not in clocks:
+                clocks[column, unit] = ClockScan(resolution_ns(raw, unit), wrap_of(raw, unit))
+            clocks[column, unit].add(stamps_of(table, raw, column, unit, row))
+        row += next(iter(block.values())).size
+    for one, scan in zip(plans, scans, strict=True):
+        clock = clocks[one.stamps, one.time_unit].result() if one.stamps is not None and clocks else None
+        values = scan.result()
+        yield one, Report(one, values, clock, tuple(channel_findings(table, clock, values, one)))
+
+
+def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: Plan) -> Iterator[Finding]:
+    """Yield what is wrong or odd with a channel.
+
+    Parameters
+    ----------
+    table : Table
+        Its file.
+    clock : TimeBase, optional
+        Its time base.
+    values : Values
+        Its numbers.
+    one : Plan
+        How it is read.
+    """
+    if clock is not None:
+        yield from _of_time(table, clock)
+        if one.rate_hz is not None and not clock.agrees_with(one.rate_hz):
+            yield Finding("rate", f"the nominal rate {one.rate_hz:g} Hz contradicts the stamps: {clock.said()}")
+    if values.n_missing:
+        yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
+    if values.repeats > 1.0:
+        yield Finding("repeats", f"each value stands {values.repeats:.3g} times in {one.label}: the sensor is slower")
+    limit = None if one.largest is None else one.largest / abs(one.factor)
+    if values.saturated or (limit is not None and max(-values.low, values.high) >= 0.999 * limit):
+        ends = f"{values.at_low} samples at {values.low:g}, {values.at_high} at {values.high:g}"
+        yield Finding(
+            "saturation", f"{one.label} is out of range: {ends}, up to {max(values.row_low, values.row_high)} in a row"
+        )
+    if values.rounded:
+        yield Finding(
+            "rounding", f"{one.label} is rounding: words of {values.word:.4g}, noise of less than half a word"
+        )
+
+
+def _of_time(table: Table, clock: TimeBase) -> Iterator[Finding]:
+    if clock.coarse:
+        rounded = f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, coarser than the samples"
+        yield Finding("coarse", f"{rounded}; --rate '{clock.mean_rate_hz:.6g} Hz' takes them as even")
+        return
+    if clock.gaps.count:
+        yield Finding("gaps", gap_text(table, clock))
+    for kind, tally, what in (
+        ("doubled", clock.doubled, "stamps stand twice"),
+        ("backward", clock.backward, "stamps go back"),
+        ("uneven", clock.uneven, "steps are no multiple of the usual one"),
+    ):
+        if tally.count:
+            yield Finding(kind, f"{tally.count} {what}: {_places(table, tally)}")
+    if clock.wraps:
+        yield Finding(
+            "wraps", f"the counter of the stamps began anew {clock.wraps} times, which was taken into account"
+        )
+
+
+def gap_text(table: Table, clock: TimeBase) -> str:
+    """Return how many samples are lost, where, and which share of all.
+
+    Parameters
+    ----------
+    table : Table
+        For the lines.
+    clock : TimeBase
+        With at least one gap.
+    """
+    lost = clock.gaps.missing
+    share = lost / (lost + clock.n_time)
+    kept = f"{1.0 - share:.4g} of the samples are kept, {clock.mean_rate_hz:.6g} Hz in the mean"
+    return f"{lost} samples lost in {clock.gaps.count} gaps ({_places(table, clock.gaps)}); {kept}"
+
+
+def _places(table: Table, tally: Tally) -> str:
+    """Return the first places, by line and by seconds from the start."""
+    places: list[str] = []
+    for event in tally.first[:_PLACES]:
+        line = table.line(event.row) if len(places) < 1 else None
+        where = f" (line {line})" if line is not None else f" (sample {event.row + 1})"
+        places.append(f"{event.seconds:.6g} s{where}")
+    more = f" and {tally.count - len(places)} more" if tally.count > len(places) else ""
+    return f"at {', '.join(places)}{more}"
+
+
+def remarks(channel: LogChannel) -> list[str]:
+    """Return what a user of a channel should know: what was taken for granted, contradicts, is missing or rounded.
+
+    Parameters
+    ----------
+    channel : LogChannel
+        Of a recording.
+    """
+    said = list(channel.notes)
+    if channel.clock is not None and channel.clock.gaps.count:
+        said.append(gap_text(channel.table, channel.clock))
+    if channel.clock is not None and channel.clock.wraps:
+        said.append(f"the counter of the stamps began anew {channel.clock.wraps} times, which was taken into account")
+    return said
+
+
+def word_of(channel: LogChannel) -> float:
+    """Return the word that a channel's values are multiples of [SI], 0 if there is none."""
+    known = channel.values[np.isfinite(channel.values)][:200_000]
+    return word_size(known)
+
+
+def report_data(report: Report) -> dict[str, Any]:
+    """Return a report as plain data, for JSON."""
+    one, values, clock = report.plan, report.values, report.clock
+    numbers = {
+        name: _plain(getattr(values, name))
+        for name in ("n_time", "n_missing", "low", "high", "mean", "std", "step_std", "word", "equal", "repeats")
+    }
+    return {
+        "name": one.name,
+        "column": one.table.columns[one.value].name,
+        "unit": one.unit or None,
+        "quantity": one.quantity or None,
+        "time": _clock_data(clock, one),
+        "values": numbers,
+        "saturated": values.saturated,
+        "notes": list(one.notes),
+        "findings": [{"kind": finding.kind, "message": finding.message} for finding in report.findings],
+    }
+
+
+def _clock_data(clock: TimeBase | None, one: Plan) -> dict[str, Any]:
+    if clock is None:
+        return {"rate_hz": one.rate_hz, "column": None}
+    low, high = clock.rate_limits_hz
+    tallies = {name: getattr(clock, name) for name in ("gaps", "doubled", "backward", "uneven")}
+    assert one.stamps is not None
+    return {
+        "column": one.table.columns[one.stamps].name,
+        "unit_s": one.time_unit,
+        "start_ns": clock.start_ns,
+        "end_ns": clock.end_ns,
+        "rate_hz": _plain(clock.rate_hz),
+        "rate_low_hz": _plain(low),
+        "rate_high_hz": _plain(high),
+        "mean_rate_hz": _plain(clock.mean_rate_hz),
+        "jitter_s": _plain(NANO * clock.step_std_ns),
+        "rounded_to_s": NANO * clock.quantum_ns,
+        "samples_lost": clock.gaps.missing,
+        **{name: {"count": t.count, "first": [vars(e) for e in t.first[:_PLACES]]} for name, t in tallies.items()},
+    }
+
+
+def _plain(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,253 @@
+"""A recording read: channels in SI with their time base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from testbed.errors import Problem, ScenarioError
+from testbed.logs.channel import Log, LogChannel
+from testbed.logs.clock import NANO, ClockScan, TimeBase, nanoseconds, resolution_ns
+from testbed.logs.formats import open_table
+from testbed.logs.logmap import ChannelMap, LogMap, load_map
+from testbed.logs.names import take_apart
+from testbed.logs.options import refusal
+from testbed.logs.plan import Plan, channels_of, plan
+from testbed.logs.selection import TextOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from testbed.logs.table import Table
+
+
+def read_log(
+    path: str | Path,
+    map: LogMap | Mapping[str, Any] | str | Path | None = None,
+) -> Log:
+    r"""Read a recording of any format that the testbed knows.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    map : LogMap, mapping, str or Path, optional
+        Which column is what, or the YAML file that says so; left out: what the names of the columns say.
+
+    Returns
+    -------
+    Log
+        Channels in SI with their stamps.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read, a column is not there, a unit is wrong, or time is missing; with line and option.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> _ = path.write_text("t [us],gyro [deg/s]\n" + "".join(f"{500 * k},{k % 2}\n" for k in range(100)))
+    >>> channel = read_log(path).channels["gyro"]
+    >>> round(channel.rate_hz, 6), round(float(channel.values[1]), 6)
+    (2000.0, 0.017453)
+    """
+    return read_map(Path(path), as_map(map))
+
+
+def as_map(given: LogMap | Mapping[str, Any] | str | Path | None) -> LogMap | None:
+    """Return a map however it is given."""
+    if isinstance(given, str | Path):
+        return load_map(Path(given))
+    if isinstance(given, Mapping):
+        from pydantic import ValidationError
+
+        try:
+            return LogMap.model_validate(given, context={"border": True})
+        except ValidationError as error:
+            problems = [Problem(str(e["msg"]), key=".".join(map(str, e["loc"]))) for e in error.errors()]
+            raise ScenarioError(problems) from error
+    return given
+
+
+def read_map(path: Path | None, found: LogMap | None) -> Log:
+    """Read the channels of a map from a file, or from the map's own files."""
+    if found is None:
+        assert path is not None
+        table = open_table(path)
+        plans = [plan(table.columns[i].name, ChannelMap(column=str(i + 1)), table) for i in channels_of(table)]
+        return Log(path, read_plans(short_names(plans)))
+    plans = plans_of(path, found)
+    return Log(path or plans[0].table.path, read_plans(plans))
+
+
+def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
+    """Return how the channels of a map are read."""
+    options = TextOptions(found.separator, found.decimal, found.encoding, found.skip)
+    files = (
+        [path]
+        if path is not None
+        else found.file
+        if isinstance(found.file, list)
+        else [found.file]
+        if found.file
+        else []
+    )
+    tables: dict[Path, Table] = {}
+    plans = []
+    for name, channel in found.channels.items():
+        own = channel.file or (files[0] if files else None)
+        if own is None:
+            raise ScenarioError([Problem("expected the file of the recording", key=f"channels.{name}.file")])
+        if own not in tables:
+            tables[own] = open_table(own, options)
+        plans.append(plan(name, channel, tables[own], lambda field, name=name: f"channels.{name}.{field}"))  # type: ignore[misc]
+    return plans
+
+
+def short_names(plans: list[Plan]) -> list[Plan]:
+    """Return plans named after their columns without unit, where that is enough to tell them apart."""
+    short = [take_apart(one.name).name for one in plans]
+    return [
+        replace(one, name=name if short.count(name) == 1 else one.name) for one, name in zip(plans, short, strict=True)
+    ]
+
+
+def read_plans(plans: Sequence[Plan]) -> dict[str, LogChannel]:
+    """Read channels, those of one group of a file in one pass.
+
+    Raises
+    ------
+    ScenarioError
+        As `read_log`.
+    """
+    groups: dict[tuple[int, str], list[Plan]] = {}
+    for one in plans:
+        groups.setdefault((id(one.table), one.table.columns[one.value].group), []).append(one)
+    channels: dict[str, LogChannel] = {}
+    for members in groups.values():
+        channels.update(_read_group(members))
+    return {one.name: channels[one.name] for one in plans}
+
+
+def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
+    table = plans[0].table
+    scans = {(one.stamps, one.time_unit): None for one in plans if one.stamps is not None}
+    clocks: dict[tuple[int | None, float], tuple[NDArray[np.int64], TimeBase]] = {}
+    columns = _columns(table, plans)
+    for stamps, unit in scans:
+        assert stamps is not None
+        clocks[stamps, unit] = scan_clock(table, columns[stamps], stamps, unit)
+    for one in plans:
+        yield one.name, _channel(one, columns[one.value], clocks.get((one.stamps, one.time_unit)))
+
+
+def _columns(table: Table, plans: Sequence[Plan]) -> dict[int, NDArray[Any]]:
+    """Return whole columns: lists of blocks are joined one by one, so that no two copies of all stand in memory."""
+    stamps = {one.stamps for one in plans if one.stamps is not None}
+    wanted = list(dict.fromkeys([*(one.value for one in plans), *stamps]))
+    parts: dict[int, list[NDArray[Any]]] = {i: [] for i in wanted}
+    for block in table.blocks(wanted, stamps):
+        for i, values in block.items():
+            parts[i].append(values)
+    sizes = {sum(part.size for part in parts[i]) for i in wanted}
+    if min(sizes) < 1:
+        raise refusal(table.path, "expected at least 4 samples, got 0")
+    if len(sizes) > 1:
+        names = ", ".join(f"{table.columns[i].name!r} {sum(p.size for p in parts[i])}" for i in wanted)
+        raise refusal(table.path, f"expected columns of one length, got {names}")
+    columns = {}
+    for i in wanted:
+        found = parts.pop(i)
+        columns[i] = found[0] if len(found) == 1 else np.concatenate(found)
+    return columns
+
+
+def scan_clock(table: Table, values: NDArray[Any], column: int, unit_s: float) -> tuple[NDArray[np.int64], TimeBase]:
+    """Return the stamps of a whole column [ns], a counter's turns added, and what they say.
+
+    Raises
+    ------
+    ScenarioError
+        If a stamp is missing or out of range.
+    """
+    scan = ClockScan(resolution_ns(values, unit_s), wrap_of(values, unit_s))
+    stamps = scan.add(stamps_of(table, values, column, unit_s))
+    return stamps, scan.result()
+
+
+def stamps_of(table: Table, values: NDArray[Any], column: int, unit_s: float, first_row: int = 0) -> NDArray[np.int64]:
+    """Return stamps in nanoseconds; ScenarioError with the line of one that is missing or out of range."""
+    missing = (
+        np.isnat(values) if values.dtype.kind == "M" else ~np.isfinite(values) if values.dtype.kind == "f" else None
+    )
+    name = table.columns[column].name
+    if missing is not None and missing.any():
+        row = first_row + int(np.argmax(missing))
+        message = f"expected a time in {name!r}, got none; remove the line"
+        raise refusal(table.path, message, line=table.line(row))
+    try:
+        return nanoseconds(values, unit_s)
+    except OverflowError as error:
+        raise refusal(table.path, f"{error}; is the unit of {name!r} right?", "--time-unit") from error
+
+
+def wrap_of(values: NDArray[Any], unit_s: float) -> int:
+    """Return the turn of a counter of 32 bits, or of a time of day [ns]."""
+    if values.dtype.kind == "M":
+        return round(86400 / NANO) if values.size and abs(int(values.view(np.int64)[0])) < 86400 / NANO else 0
+    small = values.dtype.kind in "iu" and values.size and 0 <= int(values.max()) < 1 << 32 and int(values.min()) >= 0
+    turn = (1 << 32) * unit_s / NANO
+    return round(turn) if small and turn < float(1 << 62) else 0
+
+
+def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], TimeBase] | None) -> LogChannel:
+    table = one.table
+    numbers = values.astype(np.float64) if values.dtype.kind != "f" or values.dtype.itemsize != 8 else values
+    infinite = np.isinf(numbers)
+    if infinite.any():
+        row = int(np.argmax(infinite))
+        message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
+        raise refusal(table.path, message, line=table.line(row))
+    stamps, clock = timed if timed else (None, None)
+    notes = [*one.notes, *table.notes]
+    if clock is not None and not one.time_said:
+        assert one.rate_hz is not None
+        notes += _contradiction(one, clock)
+        stamps, clock = None, None
+    rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
+    si = numbers if one.factor == 1.0 and one.zero == 0.0 else one.zero + one.factor * numbers
+    return LogChannel(
+        name=one.name,
+        label=one.label,
+        values=si,
+        unit=one.unit,
+        quantity=one.quantity,
+        kind=one.kind,
+        stamps_ns=None if stamps is None else stamps + one.offset_ns,
+        clock=clock,
+        rate_hz=rate_hz,
+        notes=tuple(notes),
+        table=table,
+        largest=one.largest,
+    )
+
+
+def _contradiction(one: Plan, clock: TimeBase) -> list[str]:
+    assert one.rate_hz is not None
+    assert one.stamps is not None
+    name = one.table.columns[one.stamps].name
+    if clock.agrees_with(one.rate_hz) or not clock.even:
+        lost = f", in which {clock.gaps.missing} samples are missing" if clock.gaps.count else ""
+        return [f"the stamps of {name!r}{lost} are not used: --time {name!r} does"] if lost else []
+    remedy = f"give --time {name!r} instead of --rate if they are right"
+    return [
+        f"contradiction: the nominal rate is {one.rate_hz:g} Hz, the stamps of {name!r} say {clock.said()}; {remedy}"
+    ]

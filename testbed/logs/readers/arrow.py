@@ -1,0 +1,126 @@
+"""Parquet, and Arrow's own files (Feather 2)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from testbed.logs.options import refusal
+from testbed.logs.readers.arrays import MOST_COLUMNS, exact, guard
+from testbed.logs.table import TableColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from testbed.logs.table import Block
+
+_BLOCK = 1 << 20
+_MOST_FOOTER = 16 << 20
+
+
+class ArrowTable:
+    """A Parquet or Arrow file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        ``Parquet`` or ``Arrow``.
+
+    Raises
+    ------
+    ScenarioError
+        If it is damaged, has too many columns, or claims far more than it can hold.
+    """
+
+    def __init__(self, path: Path, kind: str) -> None:
+        import pyarrow as pa
+
+        self.path, self.format = path, kind
+        self.notes: list[str] = []
+        try:
+            self._file, schema, n_time = self._open(kind)
+        except (pa.ArrowException, OSError) as error:
+            raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
+        if len(schema) > MOST_COLUMNS:
+            raise refusal(path, f"expected at most {MOST_COLUMNS} columns, got {len(schema)}: write one sample a row")
+        self._names = [field.name for field in schema if _is_number(field.type)]
+        self.columns = [TableColumn(name, _unit(schema.field(name)), "", n_time) for name in self._names]
+        self.header = {
+            k.decode(errors="replace"): v.decode(errors="replace") for k, v in (schema.metadata or {}).items()
+        }
+
+    def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
+        """Yield the wanted columns block by block."""
+        import pyarrow as pa
+
+        guard(self.path, self.format, 8 * len(wanted) * (self.columns[0].n_time or 0))
+        names = [self._names[i] for i in wanted]
+        try:
+            for batch in self._batches(names):
+                if batch.num_rows:
+                    yield {
+                        i: _array(batch.column(batch.schema.get_field_index(n)), i in stamps)
+                        for i, n in zip(wanted, names, strict=True)
+                    }
+        except (pa.ArrowException, OSError) as error:
+            raise refusal(self.path, f"cannot be read ({self.format}): {error}; is the file damaged?") from error
+
+    def line(self, row: int) -> int | None:
+        """Return None: there are no lines."""
+        return None
+
+    def _open(self, kind: str) -> tuple[Any, Any, int]:
+        if kind == "Arrow":
+            from pyarrow import ipc
+
+            file = ipc.open_file(self.path)
+            return file, file.schema, sum(file.get_batch(i).num_rows for i in range(file.num_record_batches))
+        from pyarrow import parquet
+
+        with self.path.open("rb") as stream:
+            stream.seek(-8, 2)
+            length = int.from_bytes(stream.read(4), "little")
+        if length > _MOST_FOOTER:
+            raise refusal(
+                self.path, f"expected at most {MOST_COLUMNS} columns, got a footer of {length / 1e6:.0f} MB (Parquet)"
+            )
+        file = parquet.ParquetFile(self.path)
+        return file, file.schema_arrow, file.metadata.num_rows
+
+    def _batches(self, names: list[str]) -> Iterator[Any]:
+        if self.format == "Parquet":
+            yield from self._file.iter_batches(batch_size=_BLOCK, columns=names, use_threads=False)
+        else:
+            for i in range(self._file.num_record_batches):
+                yield self._file.get_batch(i)
+
+
+def _is_number(kind: Any) -> bool:
+    import pyarrow as pa
+
+    return bool(
+        pa.types.is_integer(kind)
+        or pa.types.is_floating(kind)
+        or pa.types.is_timestamp(kind)
+        or pa.types.is_boolean(kind)
+    )
+
+
+def _unit(field: Any) -> str:
+    found = {k.decode(errors="replace").lower(): v.decode(errors="replace") for k, v in (field.metadata or {}).items()}
+    return str(found.get("unit", found.get("units", "")))
+
+
+def _array(column: Any, stamp: bool) -> NDArray[Any]:
+    import pyarrow as pa
+
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.timestamp("ns"))
+    values = column.to_numpy(zero_copy_only=False)
+    return exact(values) if stamp else np.asarray(values, np.float64)

@@ -1,0 +1,194 @@
+"""What the numbers of a channel are like, looked at block by block: size, word, repeats, saturation, an outline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from testbed.signals import FloatArray
+
+# Rows of the outline beyond which pairs are joined, and samples that the word is looked for in.
+_ROWS, _SAMPLE = 8192, 200_000
+# A word is one if all differences are whole multiples of it to this part, up to so many words.
+_WHOLE, _MOST_WORDS = 0.05, 1e6
+# Share of equal neighbours, and word in steps, from which on values count as repeated.
+_REPEATED, _FINE = 0.2, 0.2
+# Share of samples at an end, and how many in a row, that count as saturation.
+_AT_END, _IN_A_ROW = 1e-3, 3
+
+
+@dataclass(frozen=True)
+class Values:
+    """What the numbers of a channel are like, in their own unit.
+
+    Parameters
+    ----------
+    n_time, n_missing : int
+        Numbers, and how many are missing.
+    low, high, mean, std : float
+        Of those that are there.
+    step_std : float
+        Standard deviation of a number about its neighbours: rms difference over the square root of two.
+    word : float
+        To what the numbers are rounded; 0 if they are not.
+    equal : float
+        Share of numbers that are equal to the one before.
+    repeats : float
+        How many times each value stands, where values are repeated rather than rounded; else 1.
+    at_low, at_high : int
+        How many stand at an end.
+    row_low, row_high : int
+        The most in a row that do.
+    outline : ndarray, shape (n_column, 2)
+        Lowest and highest number of each stretch.
+    """
+
+    n_time: int
+    n_missing: int
+    low: float
+    high: float
+    mean: float
+    std: float
+    step_std: float
+    word: float
+    equal: float
+    repeats: float
+    at_low: int
+    at_high: int
+    row_low: int
+    row_high: int
+    outline: FloatArray
+
+    @property
+    def saturated(self) -> bool:
+        """Whether the numbers stand still at an end, as those of a sensor out of its range do."""
+        still = (self.at_low, self.row_low), (self.at_high, self.row_high)
+        moving = self.std > 0.0 and self.word < self.std
+        return (
+            moving and any(n > _AT_END * self.n_time and row >= _IN_A_ROW for n, row in still) and self.repeats == 1.0
+        )
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the noise is less than half a word, so that the readings tell of the rounding, not of the noise."""
+        return self.word > 0.0 and self.step_std**2 < (0.25 + 1.0 / 12.0) * self.word**2
+
+
+class ValueScan:
+    """Look at the numbers of a channel block by block."""
+
+    def __init__(self) -> None:
+        self._n_time, self._n_known, self._n_equal = 0, 0, 0
+        self._origin, self._sum, self._square = 0.0, 0.0, 0.0
+        self._n_pairs, self._pair_square = 0, 0.0
+        self._low, self._high = np.inf, -np.inf
+        self._ends = {-1: (0, 0), 1: (0, 0)}
+        self._last = np.nan
+        self._sample: list[FloatArray] = []
+        self._outline, self._stride = np.empty((0, 2)), 1
+
+    def add(self, values: FloatArray) -> None:
+        """Take the next numbers, NaN where one is missing."""
+        self._n_time += values.size
+        known = values[np.isfinite(values)]
+        if not known.size:
+            return
+        if not self._n_known:
+            self._origin = float(known[0])
+        rest = known - self._origin
+        self._sum += float(rest.sum())
+        self._square += float(rest @ rest)
+        self._pairs(values)
+        self._extremes(known)
+        if sum(part.size for part in self._sample) < _SAMPLE:
+            self._sample.append(known[:_SAMPLE])
+        self._n_known += known.size
+        self._draw(known)
+
+    def result(self) -> Values:
+        """Return what was found."""
+        n = max(self._n_known, 1)
+        mean = self._sum / n
+        sample = np.concatenate(self._sample) if self._sample else np.empty(0)
+        step_std = float(np.sqrt(self._pair_square / max(2 * self._n_pairs, 1)))
+        word, equal = word_size(sample), self._n_equal / max(self._n_pairs, 1)
+        moving = step_std * np.sqrt(2.0 / max(1.0 - equal, 1e-9))
+        repeated = equal > _REPEATED and word < _FINE * moving
+        nothing = not self._n_known
+        return Values(
+            n_time=self._n_time,
+            n_missing=self._n_time - self._n_known,
+            low=np.nan if nothing else float(self._low),
+            high=np.nan if nothing else float(self._high),
+            mean=np.nan if nothing else self._origin + mean,
+            std=float(np.sqrt(max(self._square / n - mean**2, 0.0))),
+            step_std=step_std,
+            word=word,
+            equal=equal,
+            repeats=1.0 / (1.0 - equal) if repeated and equal < 1.0 else 1.0,
+            at_low=self._ends[-1][0],
+            at_high=self._ends[1][0],
+            row_low=self._ends[-1][1],
+            row_high=self._ends[1][1],
+            outline=self._outline,
+        )
+
+    def _pairs(self, values: FloatArray) -> None:
+        steps = np.diff(values, prepend=self._last)
+        steps = steps[np.isfinite(steps)]
+        self._n_pairs += steps.size
+        self._n_equal += int(np.count_nonzero(steps == 0.0))
+        self._pair_square += float(steps @ steps)
+        self._last = float(values[-1])
+
+    def _draw(self, known: FloatArray) -> None:
+        """Add rows to the outline; when there are too many, join them in pairs."""
+        starts = np.arange(0, known.size, self._stride)
+        rows = np.stack([np.minimum.reduceat(known, starts), np.maximum.reduceat(known, starts)], axis=1)
+        outline = np.concatenate([self._outline, rows])
+        while len(outline) > _ROWS:
+            even = outline[: len(outline) // 2 * 2].reshape(-1, 2, 2)
+            outline = np.stack([even[:, :, 0].min(axis=1), even[:, :, 1].max(axis=1)], axis=1)
+            self._stride *= 2
+        self._outline = outline
+
+    def _extremes(self, known: FloatArray) -> None:
+        """Count the numbers at each end, and the most in a row; a run across two blocks counts as two."""
+        low, high = min(self._low, float(known.min())), max(self._high, float(known.max()))
+        for side, old, new in ((-1, self._low, low), (1, self._high, high)):
+            count, row = self._ends[side] if old == new else (0, 0)
+            here = known == new
+            if here.any():
+                edges = np.flatnonzero(np.diff(np.concatenate([[False], here, [False]]).astype(np.int8)))
+                count, row = count + int(here.sum()), max(row, int(np.diff(edges)[::2].max()))
+            self._ends[side] = (count, row)
+        self._low, self._high = low, high
+
+
+def word_size(values: FloatArray) -> float:
+    """Return the word that numbers are whole multiples of; 0 if there is none.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_time,)
+        Finite numbers.
+
+    Returns
+    -------
+    float
+        Greatest common divisor of their differences, as far as they have one.
+    """
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-12 * np.max(np.abs(values), initial=0.0)]
+    if not steps.size:
+        return 0.0
+    word = float(steps.min())
+    counts = np.rint(steps / word)
+    if counts.sum() > _MOST_WORDS:
+        return 0.0
+    if np.any(np.abs(steps / word - counts) > _WHOLE * np.maximum(counts / 10.0, 1.0)):
+        return 0.0
+    return float(steps.sum() / counts.sum())

@@ -1,0 +1,131 @@
+"""Signals of one group of a run, by attribute and by name, each with its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from testbed.signals import FloatArray
+
+
+class Source(Protocol):
+    """Where the samples of a group are: in memory or in a file."""
+
+    def __call__(self, name: str, rows: slice) -> FloatArray:
+        """Return those `rows` of the signal `name`, SI."""
+
+
+class Signals(Mapping[str, "FloatArray"]):
+    """Signals of one group as attributes and items: ``group.rate``, ``group["rate"]``, ``group.time``.
+
+    Each is a NumPy array in SI; of a run on disk it is read when it is asked for. Lost readings are NaN.
+
+    Parameters
+    ----------
+    units : mapping of str to str
+        Unit of every signal by its name, such as ``rad/s``; `time` is one of them.
+    sample_rate_hz : float
+        Rate of the samples [Hz].
+    n_time : int
+        Number of samples.
+    source : callable
+        (name, rows) -> samples.
+
+    Examples
+    --------
+    >>> group = kept({"rate": np.array([0.0, 0.1, 0.2])}, {"rate": "rad/s"}, sample_rate_hz=10.0)
+    >>> group
+    Signals(time [s], rate [rad/s]; 3 samples at 10 Hz)
+    >>> float(group.rate[-1]) == float(group["rate"][-1]) == 0.2
+    True
+    >>> group.units["rate"]
+    'rad/s'
+    """
+
+    def __init__(self, units: Mapping[str, str], sample_rate_hz: float, n_time: int, source: Source) -> None:
+        self.units, self.sample_rate_hz, self.n_time = dict(units), sample_rate_hz, n_time
+        self._source = source
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
+        """Return samples `start` <= k < `stop` of a signal in SI, without reading the rest.
+
+        Parameters
+        ----------
+        name : str
+            Which signal.
+        start, stop : int, optional
+            First sample and the one after the last; all if not given.
+        """
+        if name not in self.units:
+            raise KeyError(name)
+        return self._source(name, slice(start, stop))
+
+    def __getitem__(self, name: str) -> FloatArray:
+        return self.read(name)
+
+    def __getattr__(self, name: str) -> FloatArray:
+        # What is private is no signal: copying and unpickling ask for it before there is anything.
+        if name.startswith("_") or name == "units":
+            raise AttributeError(name)
+        if name not in self.units:
+            msg = f"no signal {name!r} (there are {', '.join(self.units)})"
+            raise AttributeError(msg)
+        return self.read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.units)
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    # Arrays have no single truth value, so two groups are the same if they are one.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.units]
+
+    def __repr__(self) -> str:
+        named = ", ".join(f"{name} [{unit or '-'}]" for name, unit in self.units.items())
+        return f"Signals({named}; {self.n_time} samples at {self.sample_rate_hz:g} Hz)"
+
+
+class _Kept:
+    """Arrays in memory, read-only, also after a copy."""
+
+    def __init__(self, arrays: dict[str, FloatArray]) -> None:
+        self._arrays = arrays
+        for array in arrays.values():
+            array.flags.writeable = False
+
+    def __call__(self, name: str, rows: slice) -> FloatArray:
+        return self._arrays[name][rows]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Kept, (self._arrays,)
+
+
+def kept(arrays: Mapping[str, FloatArray], units: Mapping[str, str], sample_rate_hz: float) -> Signals:
+    """Return the group made of arrays in memory, with the coordinate `time` [s] from zero on.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray, shape (n_time,)
+        Samples in SI; they become read-only.
+    units : mapping of str to str
+        Of each array.
+    sample_rate_hz : float
+        Rate of the samples [Hz].
+    """
+    n_time = next(iter(arrays.values())).size
+    return Signals(
+        {"time": "s"} | {name: units[name] for name in arrays},
+        sample_rate_hz,
+        n_time,
+        _Kept({"time": np.arange(n_time) / sample_rate_hz, **arrays}),
+    )

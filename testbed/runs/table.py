@@ -1,0 +1,50 @@
+"""The error table of a run in text cells, for the terminal and the notebook alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from testbed.runs.metrics import RunMetrics, SourceMetrics
+
+HEADINGS = ("RMSE", "aligned", "claimed std", "x floor", "x optimum")
+NOTHING = "-"
+# A tenth of the Earth's rate [deg/s].
+_SLOW = 1.5 / 3600.0
+
+
+def error_title(metrics: RunMetrics) -> str:
+    """Return what the table shows: scenario, unit, span and seed."""
+    unit, _ = error_unit(metrics)
+    span = f"{metrics.settle_s:g} s to {metrics.duration_s:g} s"
+    return f"{metrics.scenario}: error against the truth in {unit}, {span}, seed {metrics.seed}"
+
+
+def error_unit(metrics: RunMetrics) -> tuple[str, float]:
+    """Return the unit of the errors and what deg/s is multiplied by for it: deg/h where all are below a tenth of the
+    Earth's rate.
+    """
+    errors = [source.rmse_deg_s for source in (*metrics.sensors.values(), *metrics.fusion.values())]
+    known = [error for error in errors if error is not None]
+    return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
+
+
+def error_cells(source: SourceMetrics, scale: float) -> list[str]:
+    """Return the cells of one sensor or filter below `HEADINGS`.
+
+    Parameters
+    ----------
+    source : SourceMetrics
+        Its errors.
+    scale : float
+        What deg/s is multiplied by.
+    """
+    errors = (source.rmse_deg_s, source.rmse_aligned_deg_s, source.mean_std_deg_s)
+    ratios = (source.over(source.floor_rmse_deg_s), source.over(source.optimum_rmse_deg_s))
+    cells = [number(None if error is None else scale * error) for error in errors]
+    return cells + [NOTHING if ratio is None else f"{ratio:.1f}" for ratio in ratios]
+
+
+def number(value: float | None) -> str:
+    """Return a number in four digits, a dash for None."""
+    return NOTHING if value is None else f"{value:.4g}"

@@ -1,0 +1,129 @@
+"""Reading the filters of a scenario and what they believe of its sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from testbed.errors import UnknownNameError, quoted
+from testbed.fusion import FILTERS
+from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.scenario.beliefs import EXACT, exact_belief
+from testbed.scenario.entries import is_name, kind_of, mapping
+from testbed.scenario.intake import unresolved
+from testbed.scenario.model import FilterSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.document import Key
+    from testbed.scenario.intake import Intake
+    from testbed.sensors.base import Sensor
+
+_REMEDY = "write 'belief: exact' for the simulator's own response and noise, or what is believed of it"
+
+
+@dataclass(frozen=True)
+class Fusion:
+    """The part `fusion` of a scenario, read beside its sensors.
+
+    Parameters
+    ----------
+    intake : Intake
+        Takes the findings, and knows what may be named.
+    sensors, types : mapping of str to Sensor, of str to str
+        The instruments that could be built, and the types of all.
+    data_sheets : mapping of str to SensorBelief or None
+        What the presets of the sensors say of them.
+    """
+
+    intake: Intake
+    sensors: Mapping[str, Sensor]
+    types: Mapping[str, str]
+    data_sheets: Mapping[str, SensorBelief | None]
+
+    def read(self, data: Any) -> dict[str, FilterSpec]:
+        """Return the filters by name; what is wrong with the others is noted."""
+        specs = {}
+        for name, entry in mapping(self.intake.document, data, ("fusion",)).items():
+            key = ("fusion", name)
+            if is_name(self.intake.document, name, key):
+                spec = self._filter(name, dict(mapping(self.intake.document, entry, key)), key)
+                if spec is not None:
+                    specs[name] = spec
+        return specs
+
+    def _filter(self, name: str, entry: dict[str, Any], key: Key) -> FilterSpec | None:
+        kind = kind_of(self.intake.document, entry.pop("type", name), key)
+        written = entry.pop("belief", None)
+        if kind is None:
+            return None
+        try:
+            factory = self.intake.resolve("filter", kind, FILTERS, object)
+        except UnknownNameError as error:
+            self._find((*key, "type"), unresolved(error, kind))
+            return None
+        belief = self._belief(written, (*key, "belief"))
+        model = getattr(factory, "Parameters", None)
+        parameters = entry if model is None else self.intake.validate(model, entry, key, shipped=kind in FILTERS)
+        if parameters is None or belief is None:
+            return None
+        return FilterSpec(kind, factory, parameters, belief)
+
+    def _find(self, key: Key, message: str) -> None:
+        self.intake.document.find(key, message)
+
+    def _belief(self, written: Any, key: Key) -> dict[str, SensorBelief] | None:
+        """Return what a filter believes of each sensor; None, with the findings noted, if not of all."""
+        if written is None:
+            return self._of_presets(key)
+        if written == EXACT:
+            return self._exact(key)
+        known = self._named(written, key)
+        return None if known is None else self._of_types(known, key)
+
+    def _of_presets(self, key: Key) -> dict[str, SensorBelief] | None:
+        belief = {}
+        for name in self.types:
+            one = self.data_sheets.get(name)
+            if one is None:
+                self._find(key, f"nothing is known of sensor {name!r}: no data sheet of a preset; {_REMEDY}")
+            else:
+                belief[name] = one
+        return belief if len(belief) == len(self.types) else None
+
+    def _exact(self, key: Key) -> dict[str, SensorBelief] | None:
+        belief = {}
+        for name, sensor in self.sensors.items():
+            try:
+                belief[name] = exact_belief(sensor)
+            except ValueError as error:
+                self._find(key, f"{name}: {error}")
+        return belief if len(belief) == len(self.types) else None
+
+    def _of_types(self, known: Mapping[str, SensorBelief], key: Key) -> dict[str, SensorBelief] | None:
+        """Return what a belief that was asked for says of each sensor: by the sensor's name, or else by its type."""
+        belief = {}
+        for name, kind in self.types.items():
+            one = known.get(name, known.get(kind))
+            if one is None:
+                words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
+                self._find(key, f"{words}; {_REMEDY}")
+            else:
+                belief[name] = one
+        return belief if len(belief) == len(self.types) else None
+
+    def _named(self, written: Any, key: Key) -> Mapping[str, SensorBelief] | None:
+        """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
+        if isinstance(written, str):
+            try:
+                return load_belief(written)
+            except UnknownNameError as error:
+                self._find(key, str(error))
+                return None
+        if not isinstance(written, dict):
+            self._find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
+            return None
+        read = {str(name): self.intake.validate(SensorBelief, value, (*key, name)) for name, value in written.items()}
+        known = {name: one for name, one in read.items() if one is not None}
+        return known if len(known) == len(read) else None

@@ -1,0 +1,237 @@
+"""The grammar of the command line, held for every command; what a command says to a program, and where."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import testbed
+from testbed.cli import main
+from testbed.cli.catalogue import catalogue
+from testbed.cli.options import Output, expanded
+from tests.cli.commands import COMMANDS, arguments, options
+from tests.scenes import short_file
+
+# One prints a document anyway, the other opens a window.
+WITHOUT_TABLE = {"testbed schema", "testbed view"}
+
+
+def say(*words, monkeypatch, capsys):
+    """Run the installed command; return status, standard output and standard error."""
+    monkeypatch.setattr("sys.argv", ["testbed", *map(str, words)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code, *capsys.readouterr()
+
+
+@pytest.fixture
+def spoken(monkeypatch, capsys):
+    return lambda *words: say(*words, monkeypatch=monkeypatch, capsys=capsys)
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_keeps_the_grammar(name):
+    command = COMMANDS[name]
+    assert is_sentence(" ".join(command.help.split()))
+    for part in arguments(command):
+        assert re.fullmatch(r"[A-Z_]+(\.[a-z]+)?", part.metavar), "placeholders are capitals"
+    for word, part in options(command).items():
+        assert re.fullmatch(r"--[a-z]+(-[a-z]+)*", word), "options are whole words"
+        assert is_sentence(part.help), f"{word}: help is a finished sentence"
+    if name not in WITHOUT_TABLE:
+        assert {"--json", "--quiet"} <= options(command).keys()
+    if "--out" in options(command) and (default := options(command)["--out"].default) is not None:
+        assert Path(default).parts[0] == "runs"
+
+
+def is_sentence(text: str) -> bool:
+    return bool(re.fullmatch(r"[A-Z\"'(N0-9].*[.]", text)) and "`" not in text and ":math:" not in text
+
+
+@pytest.mark.contract
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in catalogue().items() for name in names])
+def test_every_summary_is_one_finished_sentence(kind, name):
+    summary = catalogue()[kind][name]
+    assert is_sentence(summary), summary
+    assert len(re.findall(r"[a-z0-9)]\. [A-Z]", summary)) == 0, f"one sentence: {summary}"
+    assert len(summary) <= 140, f"{len(summary)} characters: {summary}"
+
+
+def test_list_says_the_whole_summary_on_a_narrow_terminal(monkeypatch, capsys):
+    from rich.console import Console
+
+    monkeypatch.setattr("testbed.cli.terminal._console", lambda: Console(width=60))
+    _, narrow, _ = say("list", monkeypatch=monkeypatch, capsys=capsys)
+    assert max(map(len, narrow.splitlines())) <= 60
+    words = " ".join(narrow.split())
+    for names in catalogue().values():
+        for summary in names.values():
+            assert summary in words
+
+
+def test_version_is_that_of_the_package(spoken):
+    assert spoken("--version") == (0, f"testbed {testbed.__version__}\n", "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_commands_and_papers(shell, tmp_path):
+    def complete(line: str) -> str:
+        words = {
+            "COMP_WORDS": line,
+            "COMP_CWORD": str(len(line.split(" ")) - 1),
+            "_TYPER_COMPLETE_ARGS": line,
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+            "_TESTBED_COMPLETE": f"complete_{shell}",
+            "PYTHONPATH": str(Path(testbed.__file__).parents[1]),
+        }
+        code = "import sys; sys.argv = ['testbed']; from testbed.cli import main; main()"
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=words, capture_output=True, text=True, cwd=tmp_path, check=False
+        )
+        assert "Traceback" not in done.stderr
+        return done.stdout
+
+    assert "reproduce" in complete("testbed rep")
+    found = complete("testbed reproduce pap")
+    assert all(paper in found for paper in ("paper1", "paper2", "paper3"))
+
+
+def test_run_prints_its_metrics_as_one_document(tmp_path, monkeypatch, spoken):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = spoken("run", short_file(tmp_path), "--json")
+    assert status == 0
+    document = json.loads(out)
+    assert document.pop("written") == "runs/short"
+    assert document == json.loads((tmp_path / "runs" / "short" / "metrics.json").read_text())
+    assert "short: " in err, "progress goes to standard error"
+
+
+def test_a_missed_expectation_ends_with_1_beside_the_document(tmp_path, monkeypatch, spoken):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = spoken("run", short_file(tmp_path, ('"< 1"', '"< 1e-9"')), "--json", "--quiet")
+    assert status == 1
+    assert json.loads(out)["expectations"][0]["met"] is False
+
+
+def test_quiet_says_nothing_but_errors(tmp_path, monkeypatch, spoken):
+    monkeypatch.chdir(tmp_path)
+    assert spoken("run", short_file(tmp_path), "--quiet") == (0, "", "")
+    assert spoken("check", "short.yaml", "--quiet") == (0, "", "")
+    assert spoken("report", "runs/short", "--quiet") == (0, "", "")
+    status, out, err = spoken("check", "missing.yaml", "--quiet")
+    assert (status, out) == (2, "")
+    assert "missing.yaml" in err
+
+
+def test_check_says_each_key_as_written_and_in_si(tmp_path, spoken):
+    status, out, _ = spoken("check", short_file(tmp_path), "--json")
+    document = json.loads(out)
+    assert status == 0
+    assert document["scenario"] == "short"
+    assert document["keys"]["motion.0.sine.rate"] == {"written": "1 deg/s", "si": f"{math.radians(1.0)!r} rad/s"}
+    assert document["datasheets"]["mems_gyro"]
+    assert document["turntable"]["required_torque_nm"] < document["turntable"]["torque_limit_nm"]
+
+
+def test_list_says_what_the_catalogue_holds(spoken):
+    _, out, _ = spoken("list", "--json")
+    assert json.loads(out) == catalogue()
+
+
+def test_allan_says_coefficients_and_curve(tmp_path, monkeypatch, spoken, rng):
+    """White noise of 0.15 deg/sqrt(h) at 100 Hz; N of 20 000 samples is known to 1/sqrt(2 n) = 0.5 %; six times."""
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("white.csv", 0.15 / 60.0 * np.sqrt(100.0) * rng.standard_normal(20_000))
+    status, out, _ = spoken("allan", "white.csv", "--unit", "deg/s", "--rate", "100 Hz", "--max-tau", "20", "--json")
+    assert status == 0
+    document = json.loads(out)
+    assert Path(document["written"]) == Path("runs/allan_white.svg")
+    assert Path("runs/allan_white.svg").is_file()
+    (record,) = document["records"]
+    assert record["coefficients"]["N"]["value"] == pytest.approx(0.15, rel=0.03)
+    assert record["coefficients"]["N"]["unit"] == "deg/sqrt(h)"
+    assert record["coefficients"]["K"]["value"] is None
+    assert record["fitted_to_s"] <= 20.0 < record["curve"]["tau_s"][-1]
+    # deg/sqrt(h) over sqrt(tau = 10 ms in hours) is deg/h.
+    assert record["curve"]["deviation_deg_h"][0] == pytest.approx(0.15 / np.sqrt(0.01 / 3600.0), rel=0.03)
+
+
+def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
+    def report(seeds, out):
+        (out / "scale_factor.csv").write_text("frequency_hz,fused\n0.5,1.01\n1,\n")
+        (out / "linearity.csv").write_text("frequency_hz,name\n2,nan\n3,gyro\n")
+        yield f"{seeds} seed"
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("testbed.reproduce.paper2.report", report)
+    status, out, err = spoken("reproduce", "paper2", "--json")
+    assert (status, err) == (0, "1 seed\n")
+    assert json.loads(out) == {
+        "paper": "paper2",
+        "tables": {
+            "scale_factor": [{"frequency_hz": 0.5, "fused": 1.01}, {"frequency_hz": 1.0, "fused": None}],
+            "linearity": [{"frequency_hz": 2.0, "name": None}, {"frequency_hz": 3.0, "name": "gyro"}],
+        },
+        "written": "runs/paper2",
+    }
+    assert spoken("reproduce", "paper2")[1:] == ("1 seed\n", "")
+    assert spoken("reproduce", "paper2", "--quiet")[1:] == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--block", "0"), "--block: expected more than 0 s, got 0"),
+        (("--block", "5 Hz"), "--block: "),
+        (("--block", "long"), "--block: "),
+    ],
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
+)
+def test_a_quantity_is_a_number_in_si_or_has_its_unit(tmp_path, spoken, words, message):
+    status, _, err = spoken("run", short_file(tmp_path), "--out", tmp_path / "run", *words)
+    assert status == 2
+    assert message in err
+
+
+def test_a_block_with_its_unit_gives_the_same_signals(tmp_path, spoken):
+    path = short_file(tmp_path)
+    for name, block in (("number", "0.1"), ("unit", "100 ms")):
+        assert spoken("run", path, "--out", tmp_path / name, "--block", block, "--quiet")[0] == 0
+    one, other = (testbed.open_run(tmp_path / name) for name in ("number", "unit"))
+    np.testing.assert_array_equal(one.fusion["kalman"].rate, other.fusion["kalman"].rate)
+
+
+@dataclass(frozen=True)
+class Pair:
+    left: str = field(default="l", metadata={"option": "--left", "help": "One.", "metavar": "L"})
+    right: int | None = field(default=None, metadata={"option": "--right-hand", "help": "Other."})
+
+
+def test_expanded_gives_an_option_for_each_field_and_hands_on_the_whole():
+    seen = []
+    small = typer.Typer()
+
+    @small.command()
+    @expanded
+    def command(name: Annotated[str, typer.Argument()], pair: Pair, output: Output, more: bool = False) -> None:
+        """Keep its words."""
+        seen.append((name, pair, output, more))
+
+    assert CliRunner().invoke(small, ["x", "--right-hand", "3", "--json", "--more"]).exit_code == 0
+    assert CliRunner().invoke(small, ["x"]).exit_code == 0
+    assert seen == [("x", Pair("l", 3), Output(json=True), True), ("x", Pair(), Output(), False)]
+    assert CliRunner().invoke(small, ["x", "--right-hand", "three"]).exit_code == 2
+    assert inspect.signature(command).parameters.keys() == {"name", "more", "left", "right", "json", "quiet"}

@@ -1,0 +1,105 @@
+"""Text files of every kind give the samples that were written into them, and so the noise that is in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from testbed.errors import ScenarioError
+from testbed.judging.allan_analysis import analyse
+from testbed.judging.allan_records import read
+from testbed.logs.readers.text import TextTable
+from testbed.logs.selection import Selection, TextOptions
+from tests.logs.kinds import COUNTS, DEG, FS, N_SHEET, RATE, SECONDS, TEXTS, lines
+
+
+def chosen(options):
+    """Return what is said of the columns, and of the text."""
+    return Selection(**{key: value for key, value in options.items() if key != "text"}), TextOptions(
+        **options.get("text", {})
+    )
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("kind", TEXTS)
+def test_every_kind_of_text_gives_its_samples(tmp_path, kind):
+    text, encoding, options = TEXTS[kind]
+    path = tmp_path / "log.dat"
+    path.write_bytes(text.encode(encoding))
+    (record,) = read(path, *chosen(options))
+    expected = np.deg2rad(0.002 * COUNTS if kind in {"counts", "preamble"} else RATE)
+    # Angles are differenced, and carry 12 digits of 1e3 arcsec at 1 kHz; all else is read as it was written.
+    accuracy = 1e-11 / FS * 1e6 if kind == "angle" else 2e-9
+    np.testing.assert_allclose(record.rate, expected, rtol=0, atol=accuracy)
+    assert record.sample_rate_hz == pytest.approx(FS, rel=1e-6)
+
+
+@pytest.mark.oracle
+def test_the_noise_of_the_record_is_in_its_interval(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(TEXTS["plain"][0])
+    found = analyse(read(path)[0]).fit.angle_random_walk
+    assert found.lower < np.deg2rad(N_SHEET) / 60.0 < found.upper
+
+
+def table(tmp_path, text, **options):
+    path = tmp_path / "log.csv"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return TextTable(path, TextOptions(**options))
+
+
+def test_the_dialect_is_told(tmp_path):
+    text = "Zeit;Rate\ns;deg/s\n" + "".join(f"{k},0;{k},5\n" for k in range(30))
+    assert str(table(tmp_path, text).dialect) == (
+        "utf-8, semicolons, decimal comma, header in line 1, units in line 2, rows from line 3"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "message"),
+    [
+        ("rate\n" + "0,5\n1,7\n" * 20, "--decimal", "give --decimal , or --separator ,"),
+        ("0,05\n1,70\n" * 20, "--decimal", "give --decimal , or --separator ,"),
+        ("t;w\n" + "0,5;1.5\n" * 20, "--decimal", "with a decimal comma"),
+    ],
+)
+def test_what_can_be_read_in_two_ways_is_refused_with_the_option(tmp_path, text, key, message):
+    with pytest.raises(ScenarioError) as caught:
+        table(tmp_path, text)
+    assert caught.value.problems[0].key == key
+    assert message in str(caught.value)
+
+
+def test_the_option_that_is_named_decides(tmp_path):
+    text = "0,05\n1,70\n" * 20
+    assert [c.name for c in table(tmp_path, text, separator=",").columns] == ["column 1", "column 2"]
+    one = table(tmp_path, text, decimal=",")
+    assert next(one.blocks([0]))[0][:2].tolist() == [0.05, 1.7]
+
+
+def test_a_last_line_that_was_cut_is_left_out_and_told(tmp_path):
+    log = table(tmp_path, "t,w\n" + "".join(f"0.{k},1.5\n" for k in range(10, 40)) + "0.4")
+    assert sum(block[1].size for block in log.blocks([0, 1])) == 30
+    assert "cut short" in log.notes[0]
+
+
+def test_blocks_join_to_the_whole_and_a_fault_in_a_later_one_has_its_line(tmp_path, monkeypatch):
+    rows = lines(SECONDS, DEG, head="t,w\n")
+    whole = next(iter(table(tmp_path, rows).blocks([0, 1])))
+    monkeypatch.setattr("testbed.logs.readers.text._BLOCK", 1000)
+    blocks = list(table(tmp_path, rows).blocks([0, 1]))
+    assert len(blocks) > 50
+    for i in (0, 1):
+        assert np.array_equal(np.concatenate([block[i] for block in blocks]), whole[i])
+    broken = rows.splitlines()
+    broken[3000] = "3.000;1"
+    with pytest.raises(ScenarioError) as caught:
+        list(table(tmp_path, "\n".join(broken)).blocks([0, 1]))
+    assert caught.value.problems[0].line == 3001
+
+
+def test_stamps_of_the_epoch_keep_their_nanoseconds(tmp_path):
+    log = table(tmp_path, TEXTS["header behind a mark, epoch ns"][0])
+    block = next(log.blocks([0, 1], [0]))
+    assert block[0].dtype == np.int64
+    assert block[0][1] - block[0][0] == 1_000_000
