@@ -209,6 +209,7 @@ def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
 def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
     """Print the coefficients with their intervals, limits as limits, or why there are none."""
     from testbed.judging.allan_analysis import TERMS
+    from testbed.judging.allan_words import data_sheet_lines, remarks_on
 
     console = _console()
     for analysis in analyses:
@@ -216,12 +217,14 @@ def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
         console.print(
             f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz", highlight=False
         )
-        if analysis.fit.goodness.accepted:
+        if analysis.given:
             table = Table("", "term", "value", "95 % interval", "unit", "value in SI", "SI unit")
             for term in TERMS:
                 table.add_row(*_allan_row(analysis, term))
             console.print(table)
-        console.print(analysis.verdict(), soft_wrap=True, highlight=False)
+        sheet = data_sheet_lines(analysis) if analysis.given else []
+        for line in (*sheet, analysis.verdict(), *remarks_on(analysis)):
+            console.print(line, soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {figure}", soft_wrap=True, highlight=False)
 
 
