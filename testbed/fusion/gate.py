@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from testbed.fusion.model import van_loan
+from testbed.signals import van_loan
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
