@@ -288,7 +288,9 @@ class Quantity:
         return {"type": "string", "description": f"quantity in {self.unit}", "examples": [self.example]}
 
     def _write(self, value: float, info: Any) -> str | float:
-        return f"{value!r} {self.unit}" if self.unit and (info.context or {}).get("border") else value
+        # A default of NumPy's own float would be written with its type's name.
+        si = float(value)
+        return f"{si!r} {self.unit}" if self.unit and (info.context or {}).get("border") else si
 
 
 Angle = Annotated[float, Quantity("rad", "5 mrad")]

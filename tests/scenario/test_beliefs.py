@@ -149,6 +149,19 @@ def test_arrays_have_no_exact_belief():
     assert np.isfinite(found.rate).all()
 
 
+def test_a_filter_that_cannot_take_a_belief_is_refused_by_its_name(tmp_path):
+    gyro = "mems_gyro: {type: fog, preset: fog_paper3}"
+    with pytest.raises(testbed.ScenarioError) as caught:
+        short(
+            tmp_path,
+            ("mems_gyro: {preset: adis16505_filtered}", gyro),
+            ("kalman: {}", "complementary: {belief: exact}"),
+            ("arw_shakf: {}", "kalman: {belief: exact}"),
+        )
+    assert [problem.key for problem in caught.value.problems] == ["fusion.complementary"]
+    assert "inverse is stable" in caught.value.problems[0].message
+
+
 @pytest.mark.slow
 def test_a_gyro_of_another_bandwidth_costs_little_with_its_own_belief(tmp_path):
     """With the belief of the slow gyro these three had 0.0080, 0.0077 and 0.0078 deg/s."""

@@ -161,3 +161,4 @@ class ArwShakfLiteral(ArwShakf):
     """
 
     Parameters: ClassVar[type[Part]] = ArwShakfLiteralParameters
+    dishonest = "without the gyro's input noise in Q its slow error is not counted; printed so"

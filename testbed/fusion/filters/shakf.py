@@ -133,3 +133,7 @@ class Shakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ShakfParameters
+    blames_the_other = "R of the gyro takes what a railed MHD sensor did for noise, and falls back slowly"
+    dishonest = (
+        "R follows the lag, P follows R through a gain that no longer fits: the paper's failure, kept to show it"
+    )
