@@ -8,6 +8,7 @@ from rich.table import Table
 
 from testbed.cli.console import terminal
 from testbed.judging.allan_analysis import TERMS
+from testbed.judging.allan_words import data_sheet_lines, remarks_on
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,12 +23,14 @@ def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
     for analysis in analyses:
         console.print(analysis.record.content, style="bold", soft_wrap=True)
         console.print(f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz")
-        if analysis.fit.goodness.accepted:
+        if analysis.given:
             table = Table("", "term", "value", "95 % interval", "unit", "value in SI", "SI unit")
             for term in TERMS:
                 table.add_row(*_allan_row(analysis, term))
             console.print(table)
-        console.print(analysis.verdict(), soft_wrap=True)
+        sheet = data_sheet_lines(analysis) if analysis.given else []
+        for line in (*sheet, analysis.verdict(), *remarks_on(analysis)):
+            console.print(line, soft_wrap=True)
     console.print(f"wrote {figure}", soft_wrap=True)
 
 
