@@ -92,9 +92,9 @@ def outline(values: Values) -> str:
 
 def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | None, figure: Path) -> None:
     """Print the rms of each record in bands, and what its density is."""
-    out = _console()
+    out = terminal()
     for one in found:
-        out.print(one.record.content, style="bold", soft_wrap=True, highlight=False, markup=False)
+        out.print(one.record.content, style="bold", soft_wrap=True)
         grid = Grid("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
         rate = angle = 0.0
         for band in one.bands(edges or one.decades()):
@@ -107,8 +107,7 @@ def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | N
         out.print(
             f"density {sides}, {one.method}; 95 % interval of a root density {low:.3f} to {high:.3f} times its value",
             soft_wrap=True,
-            highlight=False,
         )
         for note in one.notes:
-            out.print(note, soft_wrap=True, highlight=False, markup=False)
-    out.print(f"wrote {figure}", soft_wrap=True, highlight=False, markup=False)
+            out.print(note, soft_wrap=True)
+    out.print(f"wrote {figure}", soft_wrap=True)
