@@ -129,10 +129,20 @@ def test_the_exact_belief_is_declared_and_loads_again(tmp_path):
     assert again.fusion["arw_shakf"].belief == scenario.fusion["arw_shakf"].belief
 
 
-def test_every_output_declares_the_belief(tmp_path):
-    run = testbed.run(short(tmp_path, ("kalman: {}", "kalman: {belief: exact}")))
+def test_every_output_declares_the_belief(tmp_path, capsys):
+    from testbed.cli.terminal import print_metrics
+
+    edits = [("mems_gyro: {preset: adis16505_filtered}", "mems_gyro: {preset: adis16505}")]
+    run = testbed.run(short(tmp_path, *edits, ("kalman: {}", "kalman: {belief: exact}")), out=tmp_path / "run")
+    own = "mhd_ars: eq39, mems_gyro: adis16505"
     assert run.metrics["fusion"]["kalman"]["belief"] == "exact"
-    assert run.metrics["fusion"]["arw_shakf"]["belief"] == "eq39"
+    assert run.metrics["fusion"]["arw_shakf"]["belief"] == own
+    report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert f"kalman – exact; arw_shakf – {own}." in report
+    print_metrics(run.metrics, tmp_path / "run")
+    printed = capsys.readouterr().out
+    assert "belief of kalman: exact\n" in printed
+    assert f"belief of arw_shakf: {own}\n" in printed
 
 
 def test_a_sensor_entry_has_no_belief_of_its_own(tmp_path):
