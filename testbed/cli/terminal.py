@@ -1,4 +1,4 @@
-"""What the command line prints: tables, and the understood scenario."""
+"""What the command line prints of a run: its errors, its claims, its turntable."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from rich.table import Table
 from rich.text import Text
 
 from testbed.cli.console import terminal
-from testbed.cli.understood import understood
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
 
 if TYPE_CHECKING:
@@ -18,9 +17,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from testbed.judging.table_facts import TableFacts
     from testbed.runs.metrics import Budget, LineMetrics, RunMetrics, SourceMetrics, TurntableMetrics
-    from testbed.scenario.model import Scenario
 
 # Columns of the terminal: errors of a filter beside its name, and gain, phase and error over optimum of one line.
 _TABLE_WIDTH, _LINE_WIDTH = 61, 31
@@ -103,11 +100,12 @@ def _print_table(console: Console, table: TurntableMetrics | None) -> None:
     if table.torque_limit_nm is not None and table.torque_margin is not None:
         torque += f" of {number(table.torque_limit_nm)} N m, margin {100 * table.torque_margin:.0f} %"
     noise = f"arithmetic noise of the truth {number(table.truth_noise_deg_s)} deg/s"
-    step = _step(table.engine, table.step_s, table.step_factor, table.step_error)
+    step = step_words(table.engine, table.step_s, table.step_factor, table.step_error)
     console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True)
 
 
-def _step(engine: str | None, step: float | None, factor: float | None, error: float | None) -> str:
+def step_words(engine: str | None, step: float | None, factor: float | None, error: float | None) -> str:
+    """Return how the plant is integrated, in words; lengths in s."""
     if step is None or factor is None:
         return "integration step unknown"
     measured = "" if error is None else f", error {error:.1e} of the largest rate against MuJoCo at 50 us"
@@ -152,36 +150,3 @@ def _print_budget(console: Console, budget: Budget | None) -> None:
     crossed = ", ".join(number(freq) for freq in budget.crossovers_hz)
     where = f"crossover {crossed} Hz; " if crossed else ""
     console.print(f"noise floor: {where}{', '.join(parts)}", soft_wrap=True)
-
-
-def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
-    """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
-    console = terminal()
-    table = Table(title=f"{scenario.name}: {scenario.file}", title_justify="left")
-    for heading in ("key", "as written", "understood (SI)"):
-        # Folded, never cut: a key is one long word.
-        table.add_column(heading, overflow="fold")
-    for key, value in understood(scenario).items():
-        table.add_row(key, value["written"], value["si"])
-    console.print(table)
-    for name, sensor in scenario.sensors.items():
-        if rows := sensor.datasheet():
-            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
-            for row in rows:
-                sheet.add_row(*row)
-            console.print(sheet)
-    _print_facts(console, facts)
-    console.print("The scenario is valid.")
-
-
-def _print_facts(console: Console, facts: TableFacts) -> None:
-    modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
-    torque = f"required torque {facts.required_torque:.4g} N m"
-    if facts.torque_limit is not None:
-        used = facts.required_torque / facts.torque_limit
-        torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
-    noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
-    step = _step(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
-    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
-        if line:
-            console.print(f"turntable: {line}", soft_wrap=True)
