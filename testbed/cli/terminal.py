@@ -12,7 +12,7 @@ from testbed.cli.console import terminal
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -43,6 +43,8 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for name, source in metrics.sensors.items():
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
+    for line in _start_and_gates(metrics):
+        console.print(line, soft_wrap=True, highlight=False)
     _print_budget(console, metrics.budget)
     _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
@@ -51,6 +53,18 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
         verdict = Text("met", "green") if bound.met else Text("MISSED", "red")
         console.print(f"expected {bound.subject} {bound.metric} {bound.bound}: {number(bound.value)}", verdict)
     console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+
+
+def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
+    """Yield what the filters knew of the start, what their front part struck out, and why there are no bounds."""
+    for start, words in (("rest", "knew that the table rests at t = 0"), ("unknown", "knew nothing of the start")):
+        if names := [name for name, source in metrics.fusion.items() if source.start == start]:
+            yield f"start: {', '.join(names)} {words}"
+    for name, source in metrics.fusion.items():
+        if gated := {sensor: n for sensor, n in (source.gated or {}).items() if n}:
+            yield f"{name}: struck out {', '.join(f'{n} readings of {sensor}' for sensor, n in gated.items())}"
+    for reason in dict.fromkeys(source.no_bound for source in metrics.fusion.values() if source.no_bound):
+        yield f"no floor or optimum: {reason}"
 
 
 def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list[list[str]]]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.analysis.optimum import Optimum, optima
-from testbed.scenario.beliefs import believed, excess_density
+from testbed.scenario.beliefs import believed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -138,8 +138,8 @@ def signal_optimum(
 ) -> Optimum | None:
     """Return the best settled filter of a signal for these very sensors, None if one of them has no rational model.
 
-    With white noise only it is a bound for any run; 1/f and bias noise build up within minutes, so that a short run may
-    stay below a bound that has them.
+    With slow noise (1/f) it is what is left after hours; a short run from a known rest may stay below it
+    (`testbed.judging.bounds`).
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def signal_optimum(
     lines : sequence of (float, float)
         Frequency [Hz] and amplitude [rad/s] of each line of the signal.
     coloured : bool, optional
-        Count the sensors' noise beyond its white part too, which the filters do not know of.
+        Count the sensors' slow noise too, which the filters then know of; white noise alone bounds no real record.
     """
     found = signal_optima(sensors, sample_rate_hz, [lines], coloured=coloured)
     return None if found is None else found[0]
@@ -173,12 +173,9 @@ def signal_optima(
         Lines of each signal: frequency [Hz] and amplitude [rad/s].
     """
     belief: dict[str, SensorBelief] = {}
-    excess: dict[str, Callable[[FloatArray], FloatArray]] = {}
     for name, sensor in sensors.items():
         one = believed(sensor)
         if one is None:
             return None
         belief[name] = one
-        if coloured:
-            excess[name] = excess_density(sensor, one)
-    return optima(belief, sample_rate_hz, signals, excess=excess)
+    return optima(belief, sample_rate_hz, signals, coloured=coloured)

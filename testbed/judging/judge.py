@@ -10,13 +10,14 @@ import numpy as np
 from testbed.fusion.belief import declared
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
-from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
+from testbed.metrics.errors import ErrorMetrics, floor_density
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.judging.bounds import Bounds
     from testbed.runs.block import RunBlock
     from testbed.scenario.model import Scenario
     from testbed.scenario.step_choice import StepChoice
@@ -42,6 +43,7 @@ class Judge:
         self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
         self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
+        self._gated: dict[str, dict[str, int]] = {}
         self._table = TableMetrics(scenario, step)
 
     def write(self, block: RunBlock) -> None:
@@ -51,6 +53,7 @@ class Judge:
             self._add(name, block, readings, None)
         for name, estimate in block.fusion.items():
             error, settled = self._add(name, block, estimate.rate, estimate.std)
+            self._gated.setdefault(name, {}).update(_gated(estimate.diagnostics))
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
 
     def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> tuple[Any, int]:
@@ -75,17 +78,25 @@ class Judge:
         """
         frame = self._scenario.frame
         psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
-        floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
-        floor_deg = None if floor is None else float(np.rad2deg(floor))
-        optimum_deg, of_lines = (None, {}) if floor is None else self._optima()
+        bounds, moving = self._bounds()
+        floor = bounds.floor
+        optimum_settled = bounds.best[0].rmse if bounds.best else None
+        of_lines = {freq: float(np.rad2deg(one.rmse)) for (freq, _), one in zip(moving, bounds.best[1:], strict=False)}
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
                 "belief": declared(spec.belief),
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
-                "floor_rmse_deg_s": floor_deg,
-                "optimum_rmse_deg_s": optimum_deg,
+                "start": getattr(spec.parameters, "start", None),
+                "gated": self._gated.get(name),
+                "floor_rmse_deg_s": degrees(floor),
+                "prior_floor_rmse_deg_s": degrees(bounds.prior_floor),
+                "optimum_rmse_deg_s": degrees(
+                    bounds.from_start(getattr(spec.parameters, "start", "rest"), frame.settle, frame.duration)
+                ),
+                "optimum_settled_deg_s": degrees(optimum_settled),
+                "no_bound": bounds.reason,
                 "consistency": self._consistency[name].result(),
             }
             for name, spec in self._scenario.fusion.items()
@@ -112,25 +123,22 @@ class Judge:
         }
         return RunMetrics.model_validate(found)
 
-    def _optima(self) -> tuple[float | None, dict[float, float]]:
-        """Return what the best fixed filter of this very signal leaves [deg/s], and of each line alone, by frequency
-        [Hz].
-
-        One value for all filters; None and nothing without lines.
-        """
+    def _bounds(self) -> tuple[Bounds, list[tuple[float, float]]]:
+        """Return what no filter gets below, one for all filters, and the lines that move."""
         lines = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
         # A table that does not move has no lines in its truth, only arithmetic noise.
         moving = [(freq, amplitude) for freq, amplitude in lines if amplitude > np.deg2rad(1e-9)]
-        if not moving:
-            return None, {}
-        from testbed.judging.budget import signal_optima
+        from testbed.judging.bounds import bounds_of
 
-        rates = {name: self._rates[name] for name in self._scenario.sensors}
-        best = signal_optima(self._scenario.sensors, rates, [lines, *([line] for line in moving)])
-        if best is None:
-            return None, {}
-        whole, *alone = (float(np.rad2deg(one.rmse)) for one in best)
-        return whole, {freq: value for (freq, _), value in zip(moving, alone, strict=True)}
+        frame, sensors = self._scenario.frame, self._scenario.sensors
+        found = bounds_of(
+            sensors,
+            {name: self._rates[name] for name in sensors},
+            [lines, *([line] for line in moving)] if moving else [],
+            bandwidth=frame.bandwidth,
+            no_rate_below=frame.no_rate_below,
+        )
+        return found, moving
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
         rows = []
@@ -146,6 +154,17 @@ class Judge:
                 }
             )
         return rows
+
+
+def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:
+    """Return how many readings of each sensor the front part of a filter has struck out so far."""
+    stem = "gated_"
+    return {key[len(stem) :]: int(n[-1]) for key, n in diagnostics.items() if key.startswith(stem) and n.size}
+
+
+def degrees(value: float | None) -> float | None:
+    """Return deg/s of a value in rad/s, None of None."""
+    return None if value is None else float(np.rad2deg(value))
 
 
 def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:

@@ -177,7 +177,9 @@ def floor_density(psds: Sequence[Callable[[FloatArray], FloatArray]], freq_hz: F
     return floor
 
 
-def floor_rmse(psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float) -> float | None:
+def floor_rmse(
+    psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float, lowest_hz: float | None = None
+) -> float | None:
     r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_0^W df / \sum_i 1/S_i}`
     [rad/s].
 
@@ -190,12 +192,16 @@ def floor_rmse(psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz:
         Input-referred two-sided noise density of each sensor, Hz -> rad^2/s.
     bandwidth_hz : float
         W [Hz].
+    lowest_hz : float, optional
+        Where the rate is known to have nothing below [Hz]: the integral begins here (Wiener's formula for a rate that
+        is unknown in the rest of the band).
     """
     if not psds:
         return None
-    decades = np.log10(bandwidth_hz) + 6.0
-    freq = np.logspace(-6.0, np.log10(bandwidth_hz), max(int(200 * decades), 2))
+    first = 1e-6 if lowest_hz is None else lowest_hz
+    freq = np.geomspace(first, bandwidth_hz, max(int(200 * np.log10(bandwidth_hz / first)), 2))
     density = floor_density(psds, freq)
     if not np.all(np.isfinite(density)):
         return None
-    return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + density[0] * freq[0])))
+    below = density[0] * freq[0] if lowest_hz is None else 0.0
+    return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + below)))

@@ -68,7 +68,8 @@ class ConsistencyMetrics(Entry):
 
 class SourceMetrics(Entry):
     """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
-    a filter's is from.
+    a filter's is from, `start` what it knew, `gated` what its front part struck out, by sensor, `no_bound` why floor
+    and optimum are missing.
     """
 
     belief: str | None = None
@@ -80,7 +81,12 @@ class SourceMetrics(Entry):
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
     floor_rmse_deg_s: float | None = None
+    start: str | None = None
+    gated: dict[str, int] | None = None
+    prior_floor_rmse_deg_s: float | None = None
     optimum_rmse_deg_s: float | None = None
+    optimum_settled_deg_s: float | None = None
+    no_bound: str | None = None
     consistency: ConsistencyMetrics | None = None
 
     def over(self, bound: float | None) -> float | None:

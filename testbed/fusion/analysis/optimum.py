@@ -18,7 +18,10 @@ from testbed.fusion.model import FusionModel, build_model
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from testbed.fusion.belief import SensorBelief
+    from testbed.fusion.start import StartKind
     from testbed.signals import ComplexArray, FloatArray
 
 # Decades of q [rad^2/s^(2m+1)] that are searched, per order m: from a filter slower than the crossover of the sensors
@@ -75,9 +78,9 @@ class FixedFilters:
         model, steps = self.model, len(self.K)
         keep = np.eye(model.F.shape[0]) - self.K @ model.H
         parts = []
-        for i, states in enumerate(_states_of(model)):
-            Q = np.zeros_like(model.Q)
-            Q[states, states] = model.Q[states, states]
+        for i in range(len(model.sensors)):
+            mine = model.owners == i
+            Q = np.where(np.outer(mine, mine), model.Q, 0.0)
             column = self.K[..., i]
             W = keep @ Q @ _t(keep) + model.R[i] * column[..., :, None] * column[..., None, :]
             M = keep @ model.F
@@ -161,7 +164,12 @@ class FixedFilters:
 
 
 def settled_filters(
-    belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], *, order: int, q: FloatArray
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    *,
+    order: int,
+    q: FloatArray,
+    coloured: bool = False,
 ) -> FixedFilters:
     """Solve the periodic Riccati equation for every q.
 
@@ -175,6 +183,8 @@ def settled_filters(
         Order m of the signal model.
     q : ndarray, shape (n_q,)
         Signal noise [rad^2/s^(2m+1)].
+    coloured : bool, optional
+        The filters know of the slow noise, too; a constant such as the turn-on bias they take as known.
 
     Returns
     -------
@@ -190,13 +200,18 @@ def settled_filters(
     ----------
     Chu, Fan, Lin, Wang, Int. J. Control 77 (2004) 767-788 (doubling of the periodic discrete-time Riccati equation).
     """
-    model = build_model(belief, sample_rate_hz, order=order, q=0.0)
-    unit = build_model(belief, sample_rate_hz, order=order, q=1.0).Q - model.Q
+    model = build_model(belief, sample_rate_hz, order=order, q=0.0, coloured=coloured)
+    unit = (
+        build_model(belief, sample_rate_hz, order=order, q=1.0).Q
+        - build_model(belief, sample_rate_hz, order=order, q=0.0).Q
+    )
+    if coloured:
+        unit = np.pad(unit, (0, model.n_slow))
     if np.any(model.R <= 0.0):
         msg = f"belief: expected an output_noise above 0 for each of {list(model.sensors)}"
         raise ValueError(msg)
     Q = model.Q + np.asarray(q)[:, None, None] * unit
-    due = np.array([[p % stride == 0 for stride in model.strides] for p in range(math.lcm(*model.strides))])
+    due = _due(model)
     P = _cycle_start(model, Q, due)
     prior, gains = [], []
     for used in due:
@@ -210,8 +225,16 @@ def settled_filters(
     return FixedFilters(model, np.asarray(q, float), np.array(prior), np.array(gains))
 
 
-def _cycle_start(model: FusionModel, Q: FloatArray, due: np.ndarray) -> FloatArray:
-    """Return the settled prior covariance at step 0 by doubling the map P -> Q + A P (I + G P)^-1 A' of a cycle."""
+def _due(model: FusionModel) -> NDArray[np.bool_]:
+    """Return which sensors have a reading at each step of the cycle, shape (n_step, n_sensor)."""
+    return np.array([[p % stride == 0 for stride in model.strides] for p in range(math.lcm(*model.strides))])
+
+
+Map = tuple["FloatArray", "FloatArray", "FloatArray"]
+
+
+def _cycle(model: FusionModel, Q: FloatArray, due: NDArray[np.bool_]) -> Map:
+    """Return (A, G, Q) of the map P -> Q + A P (I + G P)^-1 A' of a whole cycle, readings and steps."""
     eye = np.eye(len(model.F))
     cycle = None
     for used in due:
@@ -220,9 +243,59 @@ def _cycle_start(model: FusionModel, Q: FloatArray, due: np.ndarray) -> FloatArr
         step = (np.broadcast_to(model.F, Q.shape), G, Q)
         cycle = step if cycle is None else _after(cycle, step, eye)
     assert cycle is not None
+    return cycle
+
+
+def _cycle_start(model: FusionModel, Q: FloatArray, due: NDArray[np.bool_]) -> FloatArray:
+    """Return the settled prior covariance at step 0 by doubling the map of a cycle."""
+    cycle = _cycle(model, Q, due)
     for _ in range(_DOUBLINGS):
-        cycle = _after(cycle, cycle, eye)
+        cycle = _after(cycle, cycle, np.eye(len(model.F)))
     return cycle[2]
+
+
+def variance_from_start(
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    *,
+    order: int,
+    q: float,
+    start: StartKind,
+    times: Sequence[float],
+) -> FloatArray:
+    """Return the variance of the rate that the Kalman filter has at some times after its start [rad^2/s^2], readings of
+    that instant used, shape (n_time,).
+
+    By doubling the map of a cycle, so that an hour costs no more than a second.
+
+    Parameters
+    ----------
+    belief, sample_rate_hz : mapping, mapping
+        As for `settled_filters`; the filter knows of the slow noise.
+    order, q : int, float
+        Signal model; q [rad^2/s^(2m+1)].
+    start : {"unknown", "rest"}
+        What is known before the first reading.
+    times : sequence of float
+        [s], rising.
+    """
+    model = build_model(belief, sample_rate_hz, order=order, q=q, coloured=True, start=start)
+    due, eye = _due(model), np.eye(len(model.F))
+    maps = [_cycle(model, model.Q, due)]
+    cycles = [round(t * model.sample_rate_hz / len(due)) for t in times]
+    P, at, found = model.P0, 0, []
+    for wanted in cycles:
+        for k in range((wanted - at).bit_length()):
+            if len(maps) == k:
+                maps.append(_after(maps[-1], maps[-1], eye))
+            if (wanted - at) >> k & 1:
+                A, G, Q = maps[k]
+                P = Q + A @ P @ np.linalg.solve(eye + G @ P, A.T)
+        at = wanted
+        g = model.H @ P
+        left = P[0, 0] - g[:, 0] @ np.linalg.solve(g @ model.H.T + np.diag(model.R), g[:, 0])
+        found.append(left)
+    return np.array(found)
 
 
 def _after(
@@ -241,14 +314,6 @@ def _t(matrix: FloatArray) -> FloatArray:
     return np.swapaxes(matrix, -1, -2)
 
 
-def _states_of(model: FusionModel) -> list[slice]:
-    """Return the states of each sensor: they follow the signal's in the order of the sensors, H reading each one's
-    first.
-    """
-    firsts = [int(np.flatnonzero(np.arange(row.size) * (row != 0.0))[0]) for row in model.H]
-    return [slice(a, b) for a, b in zip(firsts, [*firsts[1:], model.F.shape[0]], strict=True)]
-
-
 @dataclass(frozen=True)
 class Optimum:
     """The best settled filter for a signal.
@@ -263,6 +328,8 @@ class Optimum:
         Its signal noise [rad^2/s^(2m+1)].
     shares : dict of str to float
         Standard deviation that each sensor's noise causes [rad/s].
+    claimed : float
+        Standard deviation that the filter claims [rad/s].
     """
 
     rmse: float
@@ -271,6 +338,7 @@ class Optimum:
     order: int
     q: float
     shares: dict[str, float]
+    claimed: float
 
 
 def optimum(
@@ -318,6 +386,7 @@ def optima(
     *,
     excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
+    coloured: bool = False,
 ) -> list[Optimum]:
     """Return the `optimum` of each signal; the Riccati equations are solved once for all.
 
@@ -327,15 +396,17 @@ def optima(
         As for `optimum`.
     signals : sequence of sequence of (float, float)
         Lines of each signal: frequency [Hz] and amplitude [rad/s].
+    coloured : bool, optional
+        The filters know of the slow noise that the belief names; q is then refined to a quarter of a decade.
     """
     freq = np.array([line for lines in signals for line, _ in lines])
     power = np.array([0.5 * amplitude**2 for lines in signals for _, amplitude in lines])
     of_signal = np.repeat(np.eye(len(signals)), [len(lines) for lines in signals], axis=0)
     truth = np.array([belief[name].realisation().response(freq) for name in sample_rate_hz])
     best: list[Optimum | None] = [None] * len(signals)
-    for order in orders:
-        low, high = DECADES[order]
-        filters = settled_filters(belief, sample_rate_hz, order=order, q=np.logspace(low, high, high - low + 1))
+
+    def search(order: int, q: FloatArray) -> None:
+        filters = settled_filters(belief, sample_rate_hz, order=order, q=q, coloured=coloured)
         shares = filters.noise_variance() + filters.coloured_variance(
             [(excess or {}).get(name) for name in sample_rate_hz]
         )
@@ -345,6 +416,13 @@ def optima(
             known = best[k]
             if known is None or found.rmse < known.rmse:
                 best[k] = found
+
+    for order in orders:
+        low, high = DECADES[order]
+        search(order, np.logspace(low, high, high - low + 1))
+    if coloured:
+        for order, decade in sorted({(one.order, round(math.log10(one.q))) for one in best if one is not None}):
+            search(order, np.logspace(decade - 0.75, decade + 0.75, 7))
     return [one for one in best if one is not None]
 
 
@@ -359,4 +437,5 @@ def _least(filters: FixedFilters, order: int, shares: FloatArray, lag: FloatArra
         order=order,
         q=float(filters.q[i]),
         shares=dict(zip(filters.model.sensors, np.sqrt(shares[:, i]).tolist(), strict=True)),
+        claimed=float(filters.std[i]),
     )

@@ -132,7 +132,8 @@ def _bounds(rates: Mapping[str, FloatArray], protocol: FusionProtocol) -> dict[s
         judged.add(sample_times(first, rate.size - first, BASE_RATE_HZ), rate[first:], rate[first:])
         lines.append(judged.truth_lines())
     floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
-    best = signal_optima(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()}, lines)
+    clocks = {name: sensor.sample_rate for name, sensor in sensors.items()}
+    best = signal_optima(sensors, clocks, lines, coloured=True)
     # Both sensors are rational and see every frequency between them.
     assert floor is not None
     assert best is not None
