@@ -40,7 +40,8 @@ class Blend(BlockFilter):
         loops = np.where(np.arange(2) == fast, w, 2 * np.pi * low + w * seen)
         self._model = model = build_model(belief, sample_rate_hz, order=1, q=w * parameters.lag**2, start="rest")
         self._K = np.outer(loops * model.strides / model.sample_rate_hz, np.eye(len(model.F))[0])
-        self._state = np.zeros(len(model.F)), model.P0.copy(), np.zeros(2)
+        unknown = np.radians(1) ** 2 * np.diag(np.eye(len(model.F))[0])
+        self._state = np.zeros(len(model.F)), model.P0 + unknown, np.zeros(2)
 
     def _advance(self, Z, out):
         blend(*self._state, self._model.F, self._model.Q, self._model.H, self._model.R, self._K, Z, out)

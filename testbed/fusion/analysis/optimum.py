@@ -57,7 +57,7 @@ class FixedFilters:
     @property
     def std(self) -> FloatArray:
         """What each filter claims: the mean over the cycle of its settled standard deviation [rad/s], shape (n_q,)."""
-        std: FloatArray = np.sqrt(self.posterior()[:, :, 0, 0].mean(axis=0))
+        std: FloatArray = np.sqrt(np.maximum(self.posterior()[:, :, 0, 0].mean(axis=0), 0.0))
         return std
 
     def posterior(self) -> FloatArray:
