@@ -39,8 +39,9 @@ class Judge:
         self._scenario = scenario
         self._rates = rates
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
-        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
-        self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        span = (scenario.frame.settle, scenario.frame.duration)
+        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True, span=span) for name in scenario.sensors}
+        self._errors |= {name: ErrorMetrics(scenario.lines, span=span) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._table = TableMetrics(scenario, step)
 

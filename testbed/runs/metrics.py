@@ -48,11 +48,15 @@ class Entry(BaseModel, Mapping[str, Any]):
 
 
 class LineMetrics(Entry):
-    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, errors [deg/s]."""
+    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, each with half the width
+    of its 95 % interval, and errors [deg/s].
+    """
 
     frequency_hz: float
     gain: float | None = None
+    gain_ci95: float | None = None
     phase_deg: float | None = None
+    phase_ci95_deg: float | None = None
     error_deg_s: float | None = None
     optimum_deg_s: float | None = None
 
