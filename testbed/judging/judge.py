@@ -13,6 +13,7 @@ from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
+from testbed.scenario.departures import departures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -109,6 +110,7 @@ class Judge:
             "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "setup": departures(self._scenario),
             "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)

@@ -162,6 +162,16 @@ class Expectation(Entry):
     met: bool
 
 
+class PartSetup(Entry):
+    """A part of the scenario: the preset that it takes, and each `key` that is written beside it with its value `here`
+    and in the `preset`.
+    """
+
+    part: str
+    preset: str | None = None
+    differs: list[dict[str, str | None]] = []
+
+
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
@@ -185,6 +195,7 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     expectations: list[Expectation] = []
     versions: dict[str, Any] = {}
+    setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []
 
     @property
