@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Base clock of a run, at which the noise enters.
 
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
-Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1, max_length=33)]
 
 
 class MemsGyro(GyroErrors, Sensor, GyroTerms):
