@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.errors import ScenarioError
 from testbed.models.turntable.servo import required_torque
 from testbed.signals import BLOCK
 
@@ -63,6 +64,9 @@ def command_peaks(scenario: Scenario) -> Peaks:
     terms = sum(part.n_term() for _, part in scenario.motion)
     for start, n_time in windows(scenario.n_time, _STEP + terms):
         command = motion.peek(n_time, start)
+        if not (np.isfinite(command.rate).all() and np.isfinite(command.rate_mid).all()):
+            msg = f"expected a finite rate, got one that is not, from t = {start / scenario.base_rate_hz:g} s on"
+            raise ScenarioError(msg)
         torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
         for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
             if measure.size and float(np.max(measure)) > peaks[i]:

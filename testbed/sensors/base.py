@@ -11,7 +11,7 @@ import numpy as np
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.signals import BASE_RATE_HZ
-from testbed.units import Frequency
+from testbed.units import SampleRate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -96,7 +96,7 @@ class Sensor(Part):
         Where it sits on the table and how far its axis is off.
     """
 
-    sample_rate: Frequency
+    sample_rate: SampleRate
     noise: bool = True
     mounting: Mounting = Mounting()
 
