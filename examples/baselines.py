@@ -74,7 +74,7 @@ def main() -> None:
         best, coloured = (signal_optimum(SENSORS, RATES, lines, coloured=coloured) for coloured in (False, True))
         print(
             f"{signal:>8}{'optimum':>22}{best.rmse / DEG:10.5f}{'':>21}   {coloured.rmse / DEG:.5f} once 1/f noise "
-            f"has built up"
+            "has built up"
         )
         runs = [errors(signal, seed) for seed in seeds]
         for name in runs[0]:

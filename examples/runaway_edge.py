@@ -149,8 +149,8 @@ def main() -> None:
     draw(edges).savefig(PICTURE)
     ratios = [e.ratio for e in edges]
     print(
-        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; drawn in "
-        f"{PICTURE.name}"
+        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; "
+        f"drawn in {PICTURE.name}"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +64,8 @@ def _kind(part: type[Any]) -> str | None:
 
 def _summary(part: Any) -> str:
     """Return the first paragraph of a docstring without its markup."""
-    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
+    paragraph = (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+    return re.sub(r"(:\w+:)?`", "", paragraph)
 
 
 def _heads(package: str, folder: str) -> dict[str, str]:

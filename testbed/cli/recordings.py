@@ -1,4 +1,4 @@
-"""What `testbed log inspect` prints."""
+"""What `testbed log inspect` and `testbed psd` print."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from rich.table import Table as Grid
 from testbed.cli.terminal import _console
 from testbed.logs.inspection import report_data
 from testbed.logs.proposal import map_data
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
+    from testbed.judging.density import RateDensityEstimate
     from testbed.logs.clock import TimeBase
     from testbed.logs.inspection import Report
     from testbed.logs.proposal import Proposal
@@ -85,3 +88,27 @@ def outline(values: Values) -> str:
     tops = np.array([rows[place, 1].max() for place in places])
     levels = np.rint((tops - values.low) / (values.high - values.low) * (len(_BARS) - 1)).astype(int)
     return "".join(_BARS[level] for level in levels)
+
+
+def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | None, figure: Path) -> None:
+    """Print the rms of each record in bands, and what its density is."""
+    out = _console()
+    for one in found:
+        out.print(one.record.content, style="bold", soft_wrap=True, highlight=False, markup=False)
+        grid = Grid("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
+        rate = angle = 0.0
+        for band in one.bands(edges or one.decades()):
+            rate, angle = float(np.hypot(rate, band.rate)), float(np.hypot(angle, band.angle))
+            cells = (band.rate / DEG, band.angle * 1e6, rate / DEG, angle * 1e6)
+            grid.add_row(f"{band.low_hz:.4g} to {band.high_hz:.4g}", *(f"{cell:.4g}" for cell in cells))
+        out.print(grid)
+        low, high = np.sqrt(one.limits)
+        sides = "one-sided" if one.sides == 1 else "two-sided"
+        out.print(
+            f"density {sides}, {one.method}; 95 % interval of a root density {low:.3f} to {high:.3f} times its value",
+            soft_wrap=True,
+            highlight=False,
+        )
+        for note in one.notes:
+            out.print(note, soft_wrap=True, highlight=False, markup=False)
+    out.print(f"wrote {figure}", soft_wrap=True, highlight=False, markup=False)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from testbed.cli.understood import understood
+from testbed.cli.understood import translations, understood
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
 
 if TYPE_CHECKING:
@@ -169,6 +169,11 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     for key, value in understood(scenario).items():
         table.add_row(key, value["written"], value["si"])
     console.print(table)
+    for name, steps in translations(scenario).items():
+        words = Table("data sheet", "as written", "rule", "becomes", title=f"{name}: translated", title_justify="left")
+        for step in steps:
+            words.add_row(step.key, step.written, step.rule, step.becomes)
+        console.print(words)
     for name, sensor in scenario.sensors.items():
         if rows := sensor.datasheet():
             sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
@@ -209,6 +214,7 @@ def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
 def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
     """Print the coefficients with their intervals, limits as limits, or why there are none."""
     from testbed.judging.allan_analysis import TERMS
+    from testbed.judging.allan_words import data_sheet_lines, remarks_on
 
     console = _console()
     for analysis in analyses:
@@ -216,12 +222,14 @@ def print_allan(analyses: Sequence[Analysis], figure: Path) -> None:
         console.print(
             f"{analysis.record.rate.size} samples at {analysis.record.sample_rate_hz:.6g} Hz", highlight=False
         )
-        if analysis.fit.goodness.accepted:
+        if analysis.given:
             table = Table("", "term", "value", "95 % interval", "unit", "value in SI", "SI unit")
             for term in TERMS:
                 table.add_row(*_allan_row(analysis, term))
             console.print(table)
-        console.print(analysis.verdict(), soft_wrap=True, highlight=False)
+        sheet = data_sheet_lines(analysis) if analysis.given else []
+        for line in (*sheet, analysis.verdict(), *remarks_on(analysis)):
+            console.print(line, soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {figure}", soft_wrap=True, highlight=False)
 
 

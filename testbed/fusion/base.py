@@ -99,11 +99,25 @@ class BlockFilter:
 
     Parameters: ClassVar[type[Part]]
     rows: Rows = Rows()
+    # What a method promises; the contract tests hold every method to what it says here (docs/filters.md).
+    needs_both: ClassVar[bool] = False
+    """It divides the band between two sensors, and refuses one alone or three."""
+    spike_leaves: ClassVar[float] = 1.1
+    """Error after a single bad reading, 0.64 s later, over that of a run without it: at most."""
+    blames_the_other: ClassVar[str] = ""
+    """Why a sensor at its rail spoils the trust in the other one, if it does."""
+    departs: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Ranges of ``nees`` and ``nis_<sensor>`` where its own model is the truth, if it is not consistent even then."""
+    dishonest: ClassVar[str] = ""
+    """Why the claimed standard deviation is not the error's, if it is not."""
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: Part
     ) -> None:
         check_belief(belief, sample_rate_hz)
+        if self.needs_both and len(sample_rate_hz) != 2:
+            msg = f"belief: expected two sensors to divide the band between, got {list(sample_rate_hz)}"
+            raise ValueError(msg)
         self.schedule = Schedule(sample_rate_hz)
 
     @abstractmethod

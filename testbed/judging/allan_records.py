@@ -82,7 +82,7 @@ def read(
         raise refusal(source, "expected a run folder with it", "--sensor")
     if not source.is_file():
         raise refusal(source, "expected a recording or a run folder, got neither")
-    channels = [channel.rate() for channel in select(source, wanted, text)]
+    channels = select(source, wanted, text)
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
@@ -92,7 +92,7 @@ def as_record(channel: LogChannel, name: str) -> Record:
     Parameters
     ----------
     channel : LogChannel
-        A rate.
+        A rate, or increments or an angle.
     name : str
         For titles and file names.
 
@@ -101,15 +101,11 @@ def as_record(channel: LogChannel, name: str) -> Record:
     ScenarioError
         If its samples are not even.
     """
-    values = channel.even()
-    return Record(
-        name,
-        values,
-        channel.rate_hz,
-        f"{channel.label} of {channel.table.path}",
-        tuple(remarks(channel)),
-        word_of(channel),
-    )
+    rate = channel.rate()
+    content = f"{channel.label} of {channel.table.path}"
+    # The rounding of increments and angles is no noise of its own in each sample of the rate.
+    word = word_of(channel) if channel.kind == "rate" else 0.0
+    return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
 
 
 def read_run(folder: Path, sensor: str | None = None) -> list[Record]:

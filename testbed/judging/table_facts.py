@@ -9,7 +9,8 @@ import numpy as np
 
 from testbed.metrics.errors import ErrorMetrics
 from testbed.models.turntable.modes import coupled_modes
-from testbed.models.turntable.turntable import Turntable, TurntableParameters
+from testbed.models.turntable.parameters import TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.scenario.peaks import command_peaks
 from testbed.scenario.step_choice import StepChoice, choose_step, excerpt
 from testbed.signals import BASE_RATE_HZ

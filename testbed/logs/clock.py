@@ -124,7 +124,7 @@ class TimeBase:
     def said(self) -> str:
         """Return the sample rate with its interval, for the reader."""
         low, high = self.rate_limits_hz
-        return f"{self.rate_hz:.6g} Hz ({low:.6g} to {high:.6g})"
+        return f"{self.rate_hz:.6g} Hz ({low:.9g} to {high:.9g})"
 
     def agrees_with(self, rate_hz: float) -> bool:
         """Return whether a nominal rate [Hz] may be the true one: to a tenth of a per cent, or within the interval."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -22,7 +22,12 @@ RateFunction = Callable[[FloatArray], FloatArray]
 
 
 class Motion(Part):
-    """One term of the commanded motion."""
+    """One term of the commanded motion.
+
+    `example` is how a scenario may write it: the schema offers it, and the contract tests run on it.
+    """
+
+    example: ClassVar[dict[str, Any]] = {}
 
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the commanded rate [rad/s] as a pure function of time [s], shape (n_time,) -> (n_time,).

@@ -48,10 +48,8 @@ def _check_sizes(scenario: Scenario, document: Document) -> None:
     """Refuse what no run could hold, before anything is worked out with it."""
     duration, base = scenario.frame.duration, scenario.base_rate_hz
     if not duration * base <= MOST_SAMPLES:
-        document.find(
-            ("duration",),
-            f"expected at most {MOST_SAMPLES / base:.4g} s, {MOST_SAMPLES} samples of the base clock, got {duration:g} s",
-        )
+        most = f"{MOST_SAMPLES / base:.4g} s, {MOST_SAMPLES} samples of the base clock"
+        document.find(("duration",), f"expected at most {most}, got {duration:g} s")
     for kind, parts in (("sensors", scenario.sensors), ("fusion", scenario.fusion)):
         if len(parts) > _MOST_PARTS:
             document.find((kind,), f"expected at most {_MOST_PARTS}, got {len(parts)}")

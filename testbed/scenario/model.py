@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from testbed.inputs.tree import Tree
     from testbed.models.motion import Motion
     from testbed.models.turntable.floor import FloorMotion
-    from testbed.models.turntable.turntable import TurntableParameters
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.

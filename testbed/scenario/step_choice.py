@@ -15,7 +15,8 @@ from testbed.scenario.peaks import command_peaks
 from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
-    from testbed.models.turntable.turntable import TruthBlock, TurntableParameters
+    from testbed.models.turntable.parameters import TurntableParameters
+    from testbed.models.turntable.turntable import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 

@@ -95,10 +95,11 @@ KEYS = (
     *("mode", "file", "plugins", "__class__", "model_fields", "x", "", "1", "x" * 300, "a.b", "ä"),
 )
 TOKENS = (
-    *("{", "}", "[", "]", ":", ": ", "- ", "&a ", "*a", "<<: *a", "!!python/object:os.system ", "!x ", "|", ">", "'", '"'),
-    *("#", "%YAML 1.1\n---\n", "---\n", "...\n", "\t", "\n", "\r", "\0", "\ufeff", "\u2028", "? ", "@", "`", "1e999", "~"),
-    *("[" * 60, "{a: " * 60, "- " * 60, "9" * 90, "&a [*a]", " " * 300, "\n" * 100, "null", "1_0", "0o17", "2024-99-99"),
-)  # fmt: skip
+    *("{", "}", "[", "]", ":", ": ", "- ", "&a ", "*a", "<<: *a", "!!python/object:os.system ", "!x ", "|", ">"),
+    *("#", "%YAML 1.1\n---\n", "---\n", "...\n", "\t", "\n", "\r", "\0", "\ufeff", "\u2028", "? ", "@", "`", "1e999"),
+    *("[" * 60, "{a: " * 60, "- " * 60, "9" * 90, "&a [*a]", " " * 300, "\n" * 100, "null", "1_0", "0o17", "'", '"'),
+    *("~", "2024-99-99"),
+)
 
 
 def loaded(text):
@@ -154,7 +155,11 @@ def changed(rng, value):
     if number and rng.random() < 0.5:
         return f"{number[0]} {rng.choice(UNITS)}"
     if isinstance(value, int | float) and rng.random() < 0.6:
-        return value * rng.choice((0, -1, 1e-9, 1e9, 1e300, 2, 0.5)) if rng.random() < 0.7 else int(rng.choice((0, 1, -1, 2, 99, 10**9)))
+        return (
+            value * rng.choice((0, -1, 1e-9, 1e9, 1e300, 2, 0.5))
+            if rng.random() < 0.7
+            else int(rng.choice((0, 1, -1, 2, 99, 10**9)))
+        )
     if isinstance(value, list) and value and rng.random() < 0.6:
         return value * rng.choice((2, 50)) if rng.random() < 0.5 else [changed(rng, item) for item in value]
     return hostile(rng)
@@ -208,13 +213,17 @@ def hostile_yaml(rng):
         lines = ["a0: &a0 {x: 1 s}"]
         for i in range(1, levels):
             alias = f"*a{i - 1}"
-            inner = f"{{<<: [{', '.join([alias] * width)}]}}" if rng.random() < 0.3 else f"[{', '.join([alias] * width)}]"
+            inner = (
+                f"{{<<: [{', '.join([alias] * width)}]}}" if rng.random() < 0.3 else f"[{', '.join([alias] * width)}]"
+            )
             lines.append(f"{rng.choice(('motion', 'sensors', f'a{i}'))}: &a{i} {inner}")
         return "\n".join(lines)
     if kind == 1:
         return rng.choice(TOKENS) * rng.choice((1, 10, 1000, 20_000)) + rng.choice(TOKENS) * rng.choice((0, 1, 1000))
     if kind == 2:
-        return "".join(chr(rng.choice((rng.randrange(128), rng.randrange(0xD7FF)))) for _ in range(rng.choice((3, 30, 3000))))
+        return "".join(
+            chr(rng.choice((rng.randrange(128), rng.randrange(0xD7FF)))) for _ in range(rng.choice((3, 30, 3000)))
+        )
     return f"name: a\nduration: 1 s\n{rng.choice(KEYS)}: {nested(rng)}\n"
 
 

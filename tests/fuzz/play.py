@@ -88,7 +88,7 @@ def play(text, path, seconds=4 * MOST_SECONDS):
         outcome, fault = "refused", message_fault(error)
     except TookTooLongError:
         outcome, fault = "hung", "".join(traceback.format_exc().splitlines(keepends=True)[-8:])
-    except BaseException:  # whatever else comes out is what is looked for
+    except BaseException:  # noqa: BLE001 - whatever else comes out is what is looked for
         outcome, fault = "raised", traceback.format_exc()
     # Of this process: others may have the machine too.
     spent = min(time.process_time() - cpu, time.monotonic() - begin)

@@ -292,13 +292,13 @@ def test_load_finds_a_recorded_motion_beside_the_scenario_and_its_bad_line(tmp_p
 
 
 def test_load_takes_a_users_own_filter_by_its_path(tmp_path, monkeypatch):
-    (tmp_path / "own_filter.py").write_text(
+    (tmp_path / "users_filter.py").write_text(
         "class Mine:\n    def __init__(self, belief, sample_rate_hz, parameters):\n        self.parameters = "
         "parameters\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    text = GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: own_filter:Mine, gain: 3}")
-    scenario = load(tmp_path, text, plugins=["own_filter"])
+    text = GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: users_filter:Mine, gain: 3}")
+    scenario = load(tmp_path, text, plugins=["users_filter"])
     assert scenario.fusion["kalman"].parameters == {"gain": 3}
     assert scenario.fusion["kalman"].factory.__name__ == "Mine"
 

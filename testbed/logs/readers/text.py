@@ -128,8 +128,8 @@ class TextTable:
             kept = [row for row in raw.split(b"\n") if not row.lstrip().startswith(tuple(m.encode() for m in COMMENTS))]
             raw = b"\n".join(kept)
         if self.dialect.separator == " ":
-            raw = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", raw)
-            return re.sub(rb"[ \t]+", b" ", raw)
+            raw = re.sub(rb"[ \t]+", b" ", raw.replace(b"\r\n", b"\n")).removeprefix(b" ")
+            return raw.replace(b"\n ", b"\n").replace(b" \n", b"\n").removesuffix(b" ")
         return raw
 
     def _parse(self, content: bytes, types: dict[int, Any], line: int, raw: bytes, *, last: bool) -> Block:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -61,6 +61,8 @@ class PlatformPsd(Motion):
     ValueError
         If neither or both spectra are given, frequencies do not rise or the edges do not fit.
     """
+
+    example: ClassVar[dict[str, Any]] = {"spectrum": "olympus", "low": "10 Hz", "high": "50 Hz"}
 
     points: Annotated[tuple[SpectrumPoint, ...], Field(min_length=2)] | None = None
     spectrum: Literal["olympus"] | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -34,6 +34,8 @@ class Random(Motion):
     ValueError
         If `high` is not above `low`.
     """
+
+    example: ClassVar[dict[str, Any]] = {"psd": "1e-3 (deg/s)^2/Hz", "low": "10 Hz", "high": "50 Hz"}
 
     psd: RatePsd
     low: Frequency

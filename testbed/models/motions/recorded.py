@@ -6,7 +6,7 @@ import hashlib
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -91,6 +91,12 @@ class Recorded(Motion):
         If the file cannot be read or is larger than 32 MiB, a value is missing or not finite, or the samples are
         uneven.
     """
+
+    example: ClassVar[dict[str, Any]] = {
+        "file": "record.csv",
+        "time": {"column": "t", "unit": "s"},
+        "rate": {"column": "w", "unit": "deg/s"},
+    }
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column

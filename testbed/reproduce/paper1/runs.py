@@ -17,7 +17,8 @@ from testbed.fusion import estimate
 from testbed.metrics.errors import ErrorMetrics
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ, random_stream, sample_times
 from testbed.units import DEG
