@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from testbed.cli.understood import understood
+from testbed.cli.understood import translations, understood
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
 
 if TYPE_CHECKING:
@@ -169,6 +169,11 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     for key, value in understood(scenario).items():
         table.add_row(key, value["written"], value["si"])
     console.print(table)
+    for name, steps in translations(scenario).items():
+        words = Table("data sheet", "as written", "rule", "becomes", title=f"{name}: translated", title_justify="left")
+        for step in steps:
+            words.add_row(step.key, step.written, step.rule, step.becomes)
+        console.print(words)
     for name, sensor in scenario.sensors.items():
         if rows := sensor.datasheet():
             sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -9,6 +10,7 @@ if TYPE_CHECKING:
 
     from testbed.judging.table_facts import TableFacts
     from testbed.scenario.model import Scenario
+    from testbed.sensors.data_sheet import Step
 
 
 def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
@@ -22,12 +24,28 @@ def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
     }
 
 
+def translations(scenario: Scenario) -> dict[str, list[Step]]:
+    """Return, for each sensor that is given in the words of a data sheet, what they became."""
+    steps = {
+        name: type(sensor).sheet(scenario.presets["sensors"][name], border=True).steps
+        for name, sensor in scenario.sensors.items()
+    }
+    return {name: found for name, found in steps.items() if found}
+
+
+def doubts(scenario: Scenario) -> list[str]:
+    """Return what does not fit together in the sensors, by name."""
+    return [f"{name}: {doubt}" for name, sensor in scenario.sensors.items() for doubt in sensor.doubts()]
+
+
 def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:
     """Return what `testbed check` tells a program."""
     return {
         "scenario": scenario.name,
         "file": str(scenario.file),
         "keys": understood(scenario),
+        "translations": {name: [asdict(step) for step in steps] for name, steps in translations(scenario).items()},
+        "doubts": doubts(scenario),
         "datasheets": {name: dict(sensor.datasheet()) for name, sensor in scenario.sensors.items()},
         "turntable": facts.summary(),
     }

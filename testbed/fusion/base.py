@@ -106,6 +106,8 @@ class BlockFilter:
     """Error after a single bad reading, 0.64 s later, over that of a run without it: at most."""
     blames_the_other: ClassVar[str] = ""
     """Why a sensor at its rail spoils the trust in the other one, if it does."""
+    departs: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Ranges of ``nees`` and ``nis_<sensor>`` where its own model is the truth, if it is not consistent even then."""
     dishonest: ClassVar[str] = ""
     """Why the claimed standard deviation is not the error's, if it is not."""
 

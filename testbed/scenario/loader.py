@@ -20,7 +20,7 @@ from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake, unresolved
 from testbed.scenario.model import Bound, Frame, Scenario
-from testbed.sensors import SENSORS
+from testbed.sensors import SENSORS, with_preset
 from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
@@ -196,6 +196,8 @@ class _Reader:
         if name is None:
             return rest
         try:
+            if package == "testbed.sensors":
+                return with_preset(str(name), rest)
             return merge(preset(package, str(name)), rest)
         except UnknownNameError as error:
             self._doc.find((*key, "preset"), str(error))

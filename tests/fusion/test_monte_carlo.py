@@ -27,17 +27,8 @@ INSTANTS = (20, 200, 1000, 2999)  # where NEES is judged; single runs are indepe
 # One miss in a thousand over all that is compared: per filter four NEES, two NIS, two periodograms.
 MISS = 1e-3 / (8 * len(FILTERS))
 
-# What adapts R to the innovations is not consistent, not even with its own model for the truth. (lowest, highest) found
-# over the runs.
-DEPARTS = {
-    # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to
-    # 25 times too small.
-    "shakf": {"nees": (100.0, 600.0), "nis_mhd_ars": (0.6, 0.9)},
-    # A band sets R of the gyro 10 to 100 times above the true one: innovations far smaller than claimed, the estimate
-    # is hardly touched.
-    "arw_shakf": {"nees": (0.5, 1.7), "nis_mems_gyro": (0.01, 0.3)},
-    "arw_shakf_literal": {"nees": (0.5, 1.7), "nis_mems_gyro": (0.5, 0.75), "nis_mhd_ars": (0.7, 0.9)},
-}
+# What adapts R to the innovations is not consistent, not even with its own model for the truth; it says so itself.
+DEPARTS = {name: departs for name in FILTERS if (departs := resolve("filter", name, FILTERS).departs)}
 
 pytestmark = [pytest.mark.contract, pytest.mark.oracle]
 
