@@ -24,7 +24,7 @@ class BlendParameters(Part):
 
 
 class Blend(BlockFilter):
-    r"""Two first-order loops, :math:`\dot\omega = w_1 e_1 + w_2 e_2`, e what a reading has beyond the sensor's model.
+    """Two first-order loops, d rate / dt = w_1 e_1 + w_2 e_2, e what a reading has beyond the sensor's model.
 
     References
     ----------

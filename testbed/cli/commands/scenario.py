@@ -53,8 +53,7 @@ def check(
     scenario: ScenarioFile, output: Output, plugin: PluginModules = None, allow_outside: AllowOutside = False
 ) -> None:
     """Validate a scenario and print what was understood."""
-    from testbed.cli.terminal import print_scenario
-    from testbed.cli.understood import doubts, scenario_document
+    from testbed.cli.understood import doubts, print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
