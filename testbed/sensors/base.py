@@ -215,7 +215,8 @@ class Sensor(Part):
 
     @abstractmethod
     def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
-        """Return the instrument at rest.
+        """Return the instrument as it has stood for long under the rate that is on at its first sample, its noise
+        stationary.
 
         Parameters
         ----------
