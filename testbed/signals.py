@@ -64,7 +64,7 @@ class LinearFilter:
     .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
 
     State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0
-    before the first sample; a first sample other than zero is a step).
+    before the first sample; a first sample other than zero is a step), unless it is told to `settle`.
 
     Parameters
     ----------
@@ -93,6 +93,17 @@ class LinearFilter:
         self._C, self._D = C, D
         self._x, self._previous, self._started = np.zeros(n), 0.0, False
 
+    def settle(self, level: float) -> None:
+        """Start, before the first sample, as if the input had been constant for ever.
+
+        Parameters
+        ----------
+        level : float
+            The constant, any unit.
+        """
+        if self._x.size:
+            self._x[:] = np.linalg.solve(np.eye(self._x.size) - self._Phi, self._Gamma) * level
+
     def process(self, u: FloatArray) -> FloatArray:
         """Filter the next samples.
 
@@ -108,9 +119,9 @@ class LinearFilter:
         """
         y = np.empty(u.size)
         if u.size and not self._started:
-            # A jump at t = 0 leaves the state at rest: only the feed-through passes it at once.
+            # From rest a jump at t = 0 leaves the state as it is: only the feed-through passes it at once.
             self._previous, self._started = float(u[0]), True
-            y[0] = self._D * u[0]
+            y[0] = self._C @ self._x + self._D * u[0]
             self._previous = _advance(
                 self._x, self._Phi, self._Gamma, self._step, self._C, self._D, self._previous, u[1:], y[1:]
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,15 @@ _FIT_MISFIT = 1e-3
 _FORMS = tuple((n % 2, n // 2) for n in range(1, 8))
 # The noise is fitted from here up [Hz]: what rises below (1/f) is not in it.
 _WHITE_FROM_HZ = 1.0
+# What a belief and a sensor call by the same name.
+_SLOW = (
+    "noise_knee",
+    "bias_instability",
+    "rate_random_walk",
+    "turn_on_bias",
+    "lowest_frequency",
+    "resolution",
+)
 # An output noise this much below the input noise keeps R positive and changes nothing.
 _LEAST_OUTPUT = 3e-4
 
@@ -143,8 +152,8 @@ def believed(sensor: Sensor) -> SensorBelief | None:
     """Return the rational model and white noise that come closest to what a sensor is, None if none is within 0.1 %.
 
     The response is fitted from 0.01 Hz to half the sensor's sample rate by the fewest poles that do; the noise is an
-    input and an output level, fitted to the input-referred density from 1 Hz up (relative, non-negative): what rises
-    below 1 Hz (1/f) is not in it.
+    input and an output level, fitted to the input-referred density from 1 Hz up (relative, non-negative); the
+    coefficients of the slow noise, the range and the step of the readings are the sensor's own.
 
     Parameters
     ----------
@@ -177,7 +186,7 @@ def _search(sensor: Sensor) -> SensorBelief | None:
                 found = fit.belief(input_noise=inner, output_noise=max(outer, _LEAST_OUTPUT * inner))
             except ValueError:  # poles that coincide have no modal form; more poles may lie apart
                 continue
-            return found.model_copy(update={"source": EXACT})
+            return found.model_copy(update={"source": EXACT, **_slow_and_ends(sensor)})
     return None
 
 
@@ -208,3 +217,14 @@ def excess_density(sensor: Sensor, belief: SensorBelief) -> Callable[[FloatArray
         return kept
 
     return density
+
+
+def _slow_and_ends(sensor: Sensor) -> dict[str, Any]:
+    """Return the coefficients of a sensor's slow noise, its range and the step of its readings, as a belief names them.
+
+    Without noise there is no rounding either, so that a sensor at rest rightly repeats itself.
+    """
+    ends = {"range": sensor.full_scale()}
+    if not sensor.noise:
+        return ends
+    return ends | {name: value for name in _SLOW if (value := getattr(sensor, name, None)) is not None}

@@ -167,7 +167,7 @@ class _Reader:
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = Fusion(self._intake, sensors, types, self._data_sheets).read(parts["fusion"])
+        fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None

@@ -14,7 +14,7 @@ from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.sensors.data_sheet import Sheet, Word
 from testbed.signals import BASE_RATE_HZ
-from testbed.units import Frequency
+from testbed.units import SampleRate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -106,7 +106,7 @@ class Sensor(Part):
 
     words: ClassVar[tuple[Word, ...]] = ()
 
-    sample_rate: Frequency
+    sample_rate: SampleRate
     noise: bool = True
     mounting: Mounting = Mounting()
 
@@ -215,7 +215,8 @@ class Sensor(Part):
 
     @abstractmethod
     def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
-        """Return the instrument at rest.
+        """Return the instrument as it has stood for long under the rate that is on at its first sample, its noise
+        stationary.
 
         Parameters
         ----------

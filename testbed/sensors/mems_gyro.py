@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
 # A stated total noise is a typical figure: as far as this from what density and bandwidth make it is no contradiction.
 _TRUSTED = 0.15
-Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1, max_length=33)]
 
 
 def _whole_word(given: dict[str, Any]) -> float:
@@ -120,6 +120,11 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         return self
 
     @property
+    def resolution(self) -> float:
+        """One count of the word [rad/s]."""
+        return 1.0 / self.sensitivity
+
+    @property
     def transfer_function(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Numerator and denominator of the low-pass in s [rad/s], highest power first."""
         if self.numerator is not None and self.denominator is not None:
@@ -154,7 +159,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
         """Return the noise referred to the true rate; see `Sensor.input_noise_psd`."""
-        rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
+        rounding = rounding_psd(self.resolution, self.sample_rate)
         terms = self.noise_psd(freq_hz) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
@@ -162,7 +167,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     def sheet_belief(self) -> dict[str, Any]:
         """Return low-pass, white noise before it and rounding behind it; see `Sensor.sheet_belief`."""
         numerator, denominator = self.transfer_function
-        rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate) ** 0.5
+        rounding = rounding_psd(self.resolution, self.sample_rate) ** 0.5
         return {
             "numerator": numerator,
             "denominator": denominator,
@@ -204,13 +209,13 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
             ("rate random walk K", f"{60.0 * hour * self.rate_random_walk:.6g} deg/h/sqrt(h)"),
             ("quantisation Q", f"{1e6 * self.quantization:.6g} urad"),
             ("Markov bias, correlation time", f"{hour * self.markov_bias:.6g} deg/h, {self.markov_time:g} s"),
-            ("one count of the word", f"{np.rad2deg(1.0 / self.sensitivity):.6g} deg/s"),
+            ("one count of the word", f"{np.rad2deg(self.resolution):.6g} deg/s"),
             *((f"Allan deviation at {tau:g} s, before the low-pass", f"{allan[tau]:.6g} deg/h") for tau in allan),
             ("delay by decimation and age", f"{1e3 * delay:.6g} ms"),
         ]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MemsGyroStage:
-        """Return the gyro at rest; see `Sensor.start`."""
+        """Return the gyro in equilibrium with its first sample, its noise stationary; see `Sensor.start`."""
         return MemsGyroStage(self, input_rate_hz, seed, name)
 
 
@@ -239,8 +244,8 @@ class MemsGyroStage:
         self._decimator: Decimator | AgedSampler = Decimator(ratio)
         if gyro.jitter:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
-        self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.full_scale(), rounding=gyro.noise)
-        self._losses = stream("dropped")
+        self._converter = Converter(gyro.resolution, gyro.word_bits, gyro.full_scale(), rounding=gyro.noise)
+        self._losses, self._settled = stream("dropped"), False
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s], level, still and at T_0."""
@@ -251,6 +256,10 @@ class MemsGyroStage:
         sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
         if self._gyro.rate_ramp:
             sensed = sensed + self._ramp.process(true_rate.size)
+        if sensed.size and not self._settled:
+            # As it was before the record: in equilibrium with the rate that is on.
+            self._low_pass.settle(float(sensed[0]))
+            self._settled = True
         filtered = self._low_pass.process(sensed)
         if self._early:
             filtered += self._noise.process(filtered.size)

@@ -167,7 +167,7 @@ class MhdArs(Sensor, ElectronicTerms):
         return [block for block in (self.anti_alias, delay) if block is not None]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MhdArsStage:
-        """Return the sensor at rest; see `Sensor.start`."""
+        """Return the sensor in equilibrium with its first sample; see `Sensor.start`."""
         return MhdArsStage(self, input_rate_hz, seed, name)
 
 
@@ -178,7 +178,7 @@ class MhdArsStage:
         self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
-        self._gain = sensor.channel_gain
+        self._gain, self._first = sensor.channel_gain, np.nan
         self._before, self._behind = _analogue_chain(sensor, input_rate_hz)
         # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
         self._early = sensor.saturation is not None
@@ -191,7 +191,10 @@ class MhdArsStage:
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        signal = self._gain * self._channel.process(true_rate)
+        if true_rate.size and np.isnan(self._first):
+            self._first = float(true_rate[0])
+        # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
+        signal = self._gain * self._channel.process(true_rate - self._first)
         for stage in self._before:
             signal = stage.process(signal)
         if self._early:
