@@ -51,6 +51,7 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for name, source in metrics.sensors.items():
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
+    _print_bounds(console, metrics)
     _print_budget(console, metrics.budget)
     _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
@@ -143,6 +144,20 @@ def _line_cell(line: LineMetrics) -> str:
         return NOTHING
     over = f", {line.error_deg_s / line.optimum_deg_s:.1f}" if line.error_deg_s and line.optimum_deg_s else ""
     return f"{line.gain:.4f}, {line.phase_deg:+.2f} deg{over}"
+
+
+def _print_bounds(console: Console, metrics: RunMetrics) -> None:
+    """Print what nothing gets below, or why there is nothing."""
+    for source in [*metrics.fusion.values()][:1]:
+        bounds = {
+            "floor": source.floor_rmse_deg_s,
+            "floor with the prior": source.prior_floor_rmse_deg_s,
+            "optimum over this run": source.optimum_rmse_deg_s,
+            "settled": source.optimum_settled_deg_s,
+        }
+        known = ", ".join(f"{name} {number(value)} deg/s" for name, value in bounds.items() if value is not None)
+        reason = f"none {'else ' if known else ''}since {metrics.bounds_reason}" if metrics.bounds_reason else ""
+        console.print(f"bounds: {'; '.join(filter(None, (known, reason)))}", soft_wrap=True, highlight=False)
 
 
 def _print_budget(console: Console, budget: Budget | None) -> None:
