@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline changes readme pictures clean
+.PHONY: run view test lint bench baseline crash changes readme pictures clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -42,6 +42,10 @@ bench: .venv/installed-test
 # Rewrites the stored error-against-frequency curves; say in the commit why they moved.
 baseline: .venv/installed-test
 	$(BIN)/python -m tests.regression.error_vs_frequency
+
+# Kills at 200 random moments of a run, a report and a training, and disks of 20 sizes: half an hour.
+crash: .venv/installed-test
+	TESTBED_CRASH_KILLS=200 TESTBED_CRASH_SIZES=20 $(BIN)/python -m pytest -s tests/crash
 
 # The table of commands in README.md.
 readme: .venv/installed-test

@@ -134,7 +134,7 @@ def main() -> None:
     print(f", filterpy {peer / ours_us:.0f} times ours (promised: at least 150)")
     print(
         f"{'filter, with blocks':20s} {'us/step':>9}{'C':>8}{'filterpy':>10}{'/ kalman':>10}{'real time':>11}   "
-        f"promised"
+        "promised"
     )
     blocks = {"mems_gyro": Z[0, ::10].copy(), "mhd_ars": Z[1].copy()}
     plain_us = 0.0

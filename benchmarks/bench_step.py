@@ -18,7 +18,8 @@ import numpy as np
 
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable import stepping
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.scenario.loader import load_scenario
 from testbed.scenario.step_choice import choose_step
 from testbed.signals import BASE_RATE_HZ

@@ -17,7 +17,8 @@ import numpy as np
 
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable.modes import coupled_modes
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:

@@ -48,8 +48,8 @@ def belief_file() -> str:
     ]
     for name, fit in identified().items():
         lines.append(
-            f"{name}:  # {SENSORS[name][0]}, misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to "
-            f"{FREQ_HZ[-1]:g} Hz"
+            f"{name}:  # {SENSORS[name][0]}, "
+            f"misfit below {max(1.01 * fit.worst, 1e-9):.1e} from {FREQ_HZ[0]:g} to {FREQ_HZ[-1]:g} Hz"
         )
         # Nine digits: far below the misfit.
         lines += [

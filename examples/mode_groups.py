@@ -60,8 +60,8 @@ def main(trials: int = 20) -> None:
         groups = [group_modes(modes, 1.0, method=method) for modes in runs]
         print(
             (
-                f"{method}: noise ends at {[g.noise.stop for g in groups]}, mixed at {[g.mixed.stop for g in groups]}; "
-                f"moves by"
+                f"{method}: noise ends at {[g.noise.stop for g in groups]}, "
+                f"mixed at {[g.mixed.stop for g in groups]}; moves by"
             ),
             end="",
         )

@@ -44,8 +44,8 @@ def main() -> None:
         found = ratios(seeds, protocol)
         error = np.std(found, ddof=min(1, seeds - 1)) / np.sqrt(seeds)
         print(
-            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, below 1 in "
-            f"{np.sum(found < 1.0)}"
+            f"{name:22s} mean {np.mean(found):5.2f} +- {error:.2f}, median {np.median(found):5.2f}, "
+            f"below 1 in {np.sum(found < 1.0)}"
         )
 
 

@@ -75,7 +75,7 @@ def trial(freq_hz: float, amplitude: float, order: int) -> Callable[[float], boo
     z, half = readings(rate, SEED), rate.size // 2
 
     def failed(q: float) -> bool:
-        error = estimate("shakf", z, sample_rate_hz=RATES, order=order, q=q).rate - rate
+        error = estimate("shakf", z, sample_rate_hz=RATES, start="rest", order=order, q=q).rate - rate
         return bool(np.mean(error[half:] ** 2) > FAILED**2 * np.mean(rate[half:] ** 2))
 
     return failed
@@ -149,8 +149,8 @@ def main() -> None:
     draw(edges).savefig(PICTURE)
     ratios = [e.ratio for e in edges]
     print(
-        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; drawn in "
-        f"{PICTURE.name}"
+        f"\nobserved over predicted: {min(ratios):.2f} to {max(ratios):.2f} in {len(edges)} cases; "
+        f"drawn in {PICTURE.name}"
     )
 
 

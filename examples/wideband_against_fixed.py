@@ -87,7 +87,7 @@ def rmse(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
 ) -> float:
     """Return the error of a filter over the second half [deg/s]."""
-    error = estimate(name, z, sample_rate_hz=RATES, belief=belief, **own).rate - rate
+    error = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", **own).rate - rate
     return float(np.sqrt(np.mean(error[rate.size // 2 :] ** 2)) / DEG)
 
 
@@ -141,8 +141,8 @@ def against_fixed(
 ) -> None:
     """Print a line per signal, and write them to a file."""
     print(
-        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, {len(seeds)} seeds, "
-        f"{duration:g} s"
+        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, "
+        f"{len(seeds)} seeds, {duration:g} s"
     )
     rows = []
     for label in labels:
@@ -239,7 +239,8 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
     half, rest = before.size // 2, before.size // 2 + round(AFTER * RATES["mhd_ars"])
     rate = np.concatenate([before[:half], after[half:]])
     errors = [
-        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, **own).rate - one) / DEG
+        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, start="rest", **own).rate - one)
+        / DEG
         for one in (rate, after)
     ]
     real, ideal = (float(np.sqrt(np.mean(error[rest:] ** 2))) for error in errors)
@@ -249,8 +250,8 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
 def under_change(seeds: Sequence[int], own: dict[str, float]) -> None:
     """Print what a change in the middle of the run costs: promised are at most 1.3 times the error without it."""
     print(
-        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, from {AFTER:g} s after "
-        f"the change on"
+        f"{'change':>18}  without     with  largest ratio  largest error   deg/s, medians, "
+        f"from {AFTER:g} s after the change on"
     )
     for label in CHANGES:
         real, ideal, peak = np.array([change_errors(label, seed, **own) for seed in seeds]).T

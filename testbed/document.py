@@ -66,10 +66,10 @@ class Document:
         if found:
             raise ScenarioError(found)
 
-    def validate(self, model: type[Model], data: Any, key: Key, folder: Path) -> Model | None:
+    def validate(self, model: type[Model], data: Any, key: Key, folder: Path, **context: Any) -> Model | None:
         """Validate `data`, found at `key`, as `model`; note what is wrong and return None then."""
         try:
-            return model.model_validate(data, context={"border": True, "folder": folder})
+            return model.model_validate(data, context={"border": True, "folder": folder, **context})
         except ValidationError as error:
             for place, message in findings(error, model, data):
                 self.find((*key, *place), message)
@@ -147,7 +147,8 @@ def _known(model: type[BaseModel], loc: tuple[str | int, ...]) -> Iterable[str]:
         field = getattr(here, "model_fields", {}).get(step)
         if field is not None:
             here = next((c for c in _classes(field.annotation) if issubclass(c, BaseModel)), here)
-    return list(getattr(here, "model_fields", {}))
+    known: list[str] = here.known_keys() if hasattr(here, "known_keys") else list(getattr(here, "model_fields", {}))
+    return known
 
 
 def _classes(annotation: Any) -> list[type]:

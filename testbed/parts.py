@@ -15,11 +15,18 @@ from testbed.errors import Problem, ScenarioError, UnknownNameError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.inputs.plugins import Plugins
+
 
 class Part(BaseModel):
     """Frozen parameters of one block of the chain; SI floats from Python, strings with units from YAML."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file."""
+        return list(cls.model_fields)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy with other values, validated as the constructor does.
@@ -48,27 +55,33 @@ class Part(BaseModel):
             raise ScenarioError(problems) from error
 
 
-def resolve(kind: str, name: str, registry: Mapping[str, str]) -> type[Any]:
+def resolve(kind: str, name: str, registry: Mapping[str, str], plugins: Plugins | None = None) -> type[Any]:
     """Import the class that `registry` (name -> ``package.module:Class``) knows as `name`.
 
-    A `name` that contains a colon is a user's own ``package.module:Class``.
+    Parameters
+    ----------
+    kind : str
+        What it is, for messages and entry points.
+    name : str
+        Name of the registry or, given `plugins`, of an installed package's entry point, or ``module:Class``.
+    registry : mapping of str to str
+        The shipped ones.
+    plugins : Plugins, optional
+        Those that may be asked; a scenario's name alone loads no code.
 
     Raises
     ------
     UnknownNameError
-        If the name, the module or the class does not exist.
+        If there is no such class.
     """
-    target = name if ":" in name else registry.get(name)
-    if target is None:
+    if plugins is not None:
+        part = plugins.part(kind, name, registry) if ":" in name else plugins.installed(kind, name, registry)
+        if part is not None:
+            return part
+    if name not in registry:
         raise UnknownNameError(kind, name, registry)
-    module, _, attribute = target.partition(":")
-    try:
-        return cast("type[Any]", getattr(importlib.import_module(module), attribute))
-    except Exception as error:
-        # A user's own module may fail in any way; one of ours that does is our fault and keeps its traceback.
-        if ":" not in name:
-            raise
-        raise UnknownNameError(kind, name, registry, reason=f"{type(error).__name__}: {error}") from error
+    module, _, attribute = registry[name].partition(":")
+    return cast("type[Any]", getattr(importlib.import_module(module), attribute))
 
 
 def preset_names(package: str) -> list[str]:
@@ -106,3 +119,27 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
         below = merged.get(key)
         merged[key] = merge(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
     return merged
+
+
+def lay_over(
+    base: Mapping[str, Any], entry: Mapping[str, Any], ways: tuple[tuple[tuple[str, ...], ...], ...]
+) -> dict[str, Any]:
+    """Return the keys of `base` that stay when `entry` is laid over it: what it says in other words goes.
+
+    Parameters
+    ----------
+    base, entry : mapping
+        Of a preset, and of its user.
+    ways : tuple
+        For each quantity, the sets of keys that say it.
+    """
+    gone = {
+        key
+        for quantity in ways
+        for said in quantity
+        if any(k in entry for k in said)
+        for other in quantity
+        if other != said
+        for key in other
+    }
+    return {key: value for key, value in base.items() if key not in gone}

@@ -31,9 +31,9 @@ expect:
 """
 
 
-def short(folder: Path, *edits: tuple[str, str]) -> Scenario:
+def short(folder: Path, *edits: tuple[str, str], plugins: tuple[str, ...] = ()) -> Scenario:
     """Return the short scenario with (old, new) replaced in its text."""
-    return load_scenario(short_file(folder, *edits))
+    return load_scenario(short_file(folder, *edits), plugins=plugins)
 
 
 def short_file(folder: Path, *edits: tuple[str, str]) -> Path:

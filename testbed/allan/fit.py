@@ -202,8 +202,8 @@ class _Problem:
     def __init__(self, curve: AllanCurve) -> None:
         if curve.tau.size < len(_TERMS) or not np.all(curve.deviation > 0.0):
             msg = (
-                f"curve: expected at least {len(_TERMS)} averaging times and deviations above zero, got "
-                f"{curve.deviation}"
+                f"curve: expected at least {len(_TERMS)} averaging times and deviations above zero, "
+                f"got {curve.deviation}"
             )
             raise ValueError(msg)
         self._tau, self._n_time = curve.tau, curve.n_time

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.errors import RunError
+from testbed.fusion import FILTERS
+from testbed.fusion.checked import CheckedFilter
+from testbed.inputs.plugins import PluginError
 from testbed.models.turntable.turntable import Turntable
 from testbed.runs.block import RunBlock
 from testbed.scenario.step_choice import choose_step, exposed
+from testbed.sensors import SENSORS
 from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
+from testbed.sensors.checked import CheckedSensor
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from testbed.fusion import EstimateBlock
     from testbed.models.turntable.turntable import TruthBlock
-    from testbed.scenario.model import Scenario
+    from testbed.scenario.model import FilterSpec, Scenario
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
@@ -53,14 +57,21 @@ class Chain:
         self._sensors = {
             name: sensor.start(base, scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
         }
+        self._foreign = {
+            name: CheckedSensor(name, round(base / sensor.sample_rate))
+            for name, sensor in scenario.sensors.items()
+            if scenario.sensor_types[name] not in SENSORS
+        }
         rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
+        fastest = max(rates.values(), default=base)
         self._fusion = {
-            name: spec.factory(spec.belief, rates, spec.parameters) for name, spec in scenario.fusion.items()
+            name: CheckedFilter(name, _started(name, spec, rates), fastest, shipped=spec.type in FILTERS)
+            for name, spec in scenario.fusion.items()
         }
         self.rates = {
             "base": base,
             **rates,
-            **dict.fromkeys(self._fusion, max(rates.values(), default=base)),
+            **dict.fromkeys(self._fusion, fastest),
         }
 
     def process(self, n_time: int) -> RunBlock:
@@ -68,11 +79,11 @@ class Chain:
         command = self._motion.process(n_time)
         truth = self.turntable.process(command, self._motion.peek(self.turntable.lookahead))
         readings, profiles = {}, {}
-        for name, stage in self._sensors.items():
-            readings[name], profile = _sense(stage, truth.sensor_rate[name], command.start, self._around(name, truth))
+        for name in self._sensors:
+            readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: self._estimate(name, readings) for name in self._fusion}
+        estimates = {name: stage.process(readings) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         return RunBlock(
             command.start,
@@ -85,19 +96,27 @@ class Chain:
             drifts={name: stage.drift for name, stage in thermal.items()},
         )
 
-    def _estimate(self, name: str, readings: Mapping[str, FloatArray]) -> EstimateBlock:
-        """Return the estimate of a filter, which may be a user's own: one value per reading of the fastest sensor."""
-        estimate: EstimateBlock = self._fusion[name].process(readings)
-        n_time = max(values.size for values in readings.values())
-        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
-            if np.shape(values) != (n_time,):
-                msg = f"filter {name}: expected {signal} of shape ({n_time},), got {np.shape(values)}"
-                raise RunError(msg)
-        return estimate
+    def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
+        """Return the readings of a block, and the velocity profiles of a sensor that has them."""
+        stage, around = self._sensors[name], self._around(name, truth)
+
+        def feed(rate: FloatArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
+            return _sense(stage, rate, truth.start, around)
+
+        rate = truth.sensor_rate[name]
+        return self._foreign[name].sense(feed, rate) if name in self._foreign else feed(rate)
 
     def _around(self, name: str, truth: TruthBlock) -> Surroundings:
         temperature = self._temperature.at(truth.start, truth.rate.size, self.rates["base"])
         return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
+
+
+def _started(name: str, spec: FilterSpec, rates: Mapping[str, float]) -> Any:
+    try:
+        return spec.start(rates)
+    except PluginError as error:
+        msg = f"filter {name}: {error}"
+        raise RunError(msg) from error
 
 
 def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Iterator[RunBlock]]:

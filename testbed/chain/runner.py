@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from contextlib import ExitStack
 from importlib import metadata
@@ -71,8 +72,8 @@ def run(
     >>> run(still, seed=3)
     <Run still, 0.1 s, seed 3>
     """
-    if block is not None and not block > 0.0:
-        msg = f"block: expected more than 0 s, got {block!r}"
+    if block is not None and not 0.0 < block < math.inf:
+        msg = f"block: expected more than 0 s, and finite, got {block!r}"
         raise ValueError(msg)
     loaded = as_scenario(scenario)
     loaded = loaded if seed is None else loaded.with_seed(seed)
@@ -129,11 +130,12 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
             check_interrupt()
         netcdf.close()
         recording.close()
-        write_metrics(folder.path, judge.metrics(versions()).to_dict())
+        metrics = judge.metrics(versions())
+        write_metrics(folder.path, metrics.to_dict())
         write_scenario(folder.path, scenario.resolved(folder.path), versions())
         write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish({"versions": versions()}))
+        return open_run(folder.finish({"versions": versions(), "plugins": metrics.plugins}))
 
 
 def versions() -> dict[str, str]:

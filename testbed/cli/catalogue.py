@@ -4,23 +4,41 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from rich.table import Table
+
+from testbed.cli.console import terminal
 from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
+from testbed.inputs.plugins import Plugins, load_plugins, offered
+from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.parts import resolve
 from testbed.reproduce import PAPERS
 from testbed.sensors import SENSORS
+from testbed.sensors.base import Sensor
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 
-def catalogue() -> dict[str, dict[str, str]]:
-    """Return every name with its summary, one finished sentence, by kind."""
+_KINDS = {"motion": MOTIONS, "sensor": SENSORS, "filter": FILTERS}
+
+
+def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
+    """Return every name with its summary, one finished sentence, by kind.
+
+    Parameters
+    ----------
+    plugins : iterable of str, optional
+        Modules whose classes are listed too; they are loaded. What installed packages offer is listed, not loaded.
+    """
+    loaded = load_plugins(plugins)
     return {
-        "motions": {name: _summary(resolve("motion", name, MOTIONS)) for name in MOTIONS},
-        "sensors": {name: _summary(resolve("sensor", name, SENSORS)) for name in SENSORS},
-        "filters": {name: _summary(resolve("filter", name, FILTERS)) for name in FILTERS},
+        **{f"{kind}s": _offered(kind, registry, loaded) for kind, registry in _KINDS.items()},
         "turntable_presets": _heads("testbed.models", "presets"),
         "sensor_presets": _heads("testbed.sensors", "presets"),
         "beliefs": _heads("testbed.fusion", "beliefs"),
@@ -30,9 +48,41 @@ def catalogue() -> dict[str, dict[str, str]]:
     }
 
 
+def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
+    """Print what there is to choose from, the summaries wrapped beside the names."""
+    console = terminal()
+    width = max(len(name) for names in table.values() for name in names)
+    for kind, names in table.items():
+        console.print(kind.replace("_", " "), style="bold")
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(width=width + 2, no_wrap=True)
+        grid.add_column()
+        for name, summary in names.items():
+            grid.add_row(f"  {name}", summary)
+        console.print(grid)
+
+
+def _offered(kind: str, registry: Mapping[str, str], loaded: Plugins) -> dict[str, str]:
+    return {
+        **{name: _summary(resolve(kind, name, registry)) for name in registry},
+        **{name: f"Offered by {package}." for name, package in offered(kind).items()},
+        **{name: _summary(part) for name, part in loaded.classes() if _kind(part) == kind},
+    }
+
+
+def _kind(part: type[Any]) -> str | None:
+    """Return what a class of a plug-in is for a scenario; None if it is nothing."""
+    if issubclass(part, Motion):
+        return "motion"
+    if issubclass(part, Sensor):
+        return "sensor"
+    return "filter" if hasattr(part, "process") else None
+
+
 def _summary(part: Any) -> str:
     """Return the first paragraph of a docstring without its markup."""
-    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ").replace("`", "")
+    paragraph = (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+    return re.sub(r"(:\w+:)?`", "", paragraph)
 
 
 def _heads(package: str, folder: str) -> dict[str, str]:

@@ -56,8 +56,8 @@ def _plain(name: str, duration: float) -> Callable[[float], None]:
         if now - last >= _PLAIN_EVERY or done >= duration:
             speed = done / max(now - begin, 1e-9)
             line = (
-                f"{name}: {done:.0f} of {duration:g} s, {speed:.1f} x real time, {(duration - done) / speed:.0f} "
-                f"s remaining"
+                f"{name}: {done:.0f} of {duration:g} s, {speed:.1f} x real time, "
+                f"{(duration - done) / speed:.0f} s remaining"
             )
             print(line, file=sys.stderr, flush=True)  # noqa: T201 - this is the terminal
             last = now

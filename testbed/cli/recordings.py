@@ -1,4 +1,4 @@
-"""What `testbed log inspect` prints."""
+"""What `testbed log inspect` and `testbed psd` print."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table as Grid
 
-from testbed.cli.terminal import _console
+from testbed.cli.console import terminal
 from testbed.logs.inspection import report_data
 from testbed.logs.proposal import map_data
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
+    from testbed.judging.density import RateDensityEstimate
     from testbed.logs.clock import TimeBase
     from testbed.logs.inspection import Report
     from testbed.logs.proposal import Proposal
@@ -39,8 +42,8 @@ def document(table: Table, reports: Sequence[Report], proposed: Proposal) -> dic
 
 def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -> None:
     """Print what a recording holds, a row for each channel, then what is wrong and what is open."""
-    out = _console()
-    out.print(f"{table.path}: {table.format}", soft_wrap=True, highlight=False, markup=False)
+    out = terminal()
+    out.print(f"{table.path}: {table.format}", soft_wrap=True)
     grid = Grid("channel", "unit", "samples", "mean", "std", "lowest", "highest", "word", "outline")
     for report in reports:
         values = report.values
@@ -50,12 +53,12 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
         grid.add_row(report.plan.name, unit, str(values.n_time), *(f"{n:.4g}" for n in numbers), word, outline(values))
     out.print(grid)
     for name, clock in _clocks(reports).items():
-        out.print(f"time {name}: {_time(clock)}", soft_wrap=True, highlight=False, markup=False)
+        out.print(f"time {name}: {_time(clock)}", soft_wrap=True)
     lines = [note for report in reports for note in report.plan.notes]
     lines += [f"finding: {finding.message}" for report in reports for finding in report.findings]
     lines += [*table.notes, *(f"to be said: {text}" for text in proposed.open)]
     for line in dict.fromkeys(lines):
-        out.print(line, soft_wrap=True, highlight=False, markup=False)
+        out.print(line, soft_wrap=True)
 
 
 def _clocks(reports: Sequence[Report]) -> dict[str, TimeBase]:
@@ -85,3 +88,26 @@ def outline(values: Values) -> str:
     tops = np.array([rows[place, 1].max() for place in places])
     levels = np.rint((tops - values.low) / (values.high - values.low) * (len(_BARS) - 1)).astype(int)
     return "".join(_BARS[level] for level in levels)
+
+
+def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | None, figure: Path) -> None:
+    """Print the rms of each record in bands, and what its density is."""
+    out = terminal()
+    for one in found:
+        out.print(one.record.content, style="bold", soft_wrap=True)
+        grid = Grid("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
+        rate = angle = 0.0
+        for band in one.bands(edges or one.decades()):
+            rate, angle = float(np.hypot(rate, band.rate)), float(np.hypot(angle, band.angle))
+            cells = (band.rate / DEG, band.angle * 1e6, rate / DEG, angle * 1e6)
+            grid.add_row(f"{band.low_hz:.4g} to {band.high_hz:.4g}", *(f"{cell:.4g}" for cell in cells))
+        out.print(grid)
+        low, high = np.sqrt(one.limits)
+        sides = "one-sided" if one.sides == 1 else "two-sided"
+        out.print(
+            f"density {sides}, {one.method}; 95 % interval of a root density {low:.3f} to {high:.3f} times its value",
+            soft_wrap=True,
+        )
+        for note in one.notes:
+            out.print(note, soft_wrap=True)
+    out.print(f"wrote {figure}", soft_wrap=True)

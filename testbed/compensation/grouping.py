@@ -116,8 +116,8 @@ def group_modes(
         mixed = [k for k in range(n_mode) if not entropy(modes[k], [scale])[0] < threshold]
         if not mixed:
             msg = (
-                f"modes: expected one with {method} of at least {threshold} at scale {scale}, got none; try "
-                f"method='period'"
+                f"modes: expected one with {method} of at least {threshold} at scale {scale}, "
+                "got none; try method='period'"
             )
             raise ValueError(msg)
         begin, end = mixed[0], mixed[-1] + 1

@@ -101,8 +101,8 @@ def gather(cycles: Sequence[Record], features: Features, *, block: float, most: 
     shortest, total = min(cycle.duration for cycle in cycles), sum(cycle.duration for cycle in cycles)
     if not block > _AVERAGE or shortest < 2.0 * block:
         msg = (
-            f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, got one of "
-            f"{shortest:g} s"
+            f"cycles: expected at least two blocks of {block:g} s (over {_AVERAGE:g} s) in each, "
+            f"got one of {shortest:g} s"
         )
         raise ValueError(msg)
     average = _AVERAGE if most is None else max(_AVERAGE, total / most)

@@ -64,7 +64,7 @@ class ThermalRecord:
         )
 
 
-def read(source: Path, columns: Columns) -> ThermalRecord:
+def read_thermal(source: Path, columns: Columns) -> ThermalRecord:
     """Return the record of a run folder or of a text file.
 
     Parameters
@@ -85,7 +85,7 @@ def read(source: Path, columns: Columns) -> ThermalRecord:
         If something is missing, not understood, no number or uneven in time.
     """
     if source.is_dir():
-        return read_run(source, columns.sensor)
+        return read_thermal_run(source, columns.sensor)
     if not source.is_file():
         raise refusal(source, "expected a recording or a run folder, got neither")
     return read_file(source, columns)
@@ -114,7 +114,7 @@ def check_options(sources: Sequence[Path], columns: Columns) -> None:
                 raise refusal(sources[0], "expected a text file with it; a run folder knows its signals", option)
 
 
-def read_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
+def read_thermal_run(folder: Path, sensor: str | None = None) -> ThermalRecord:
     """Return the readings of a gyro with a thermometer.
 
     Parameters

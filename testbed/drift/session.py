@@ -13,7 +13,7 @@ from testbed.compensation import PAPER, paper3
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
-from testbed.drift.records import ThermalRecord, check_options, read
+from testbed.drift.records import ThermalRecord, check_options, read_thermal
 from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.runs.atomic import write_text
 from testbed.runs.folder import failing_as_run_error
@@ -64,7 +64,7 @@ def train_model(
     _check_file(out)
     cycles: list[ThermalRecord] = []
     for source in sources:
-        cycle = read(source, columns)
+        cycle = read_thermal(source, columns)
         _check_cycle(source, cycle, cycles)
         cycles.append(cycle)
         tell(f"cycle: {cycle}")
@@ -156,7 +156,7 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     """
     check_options([source], columns)
     _check_file(out)
-    model, thermal = read_model(path), read(source, columns)
+    model, thermal = read_model(path), read_thermal(source, columns)
     tell(f"record: {thermal}")
     block = model.apply(thermal.record)
     t = np.arange(block.rate.size) / thermal.record.sample_rate_hz
@@ -193,7 +193,7 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     if out.exists() and not out.is_dir():
         raise ScenarioError([Problem("expected a folder to write, got a file", key="--out", file=str(out))])
     trained = None if model == PAPER else _read_document(Path(model))
-    thermal = read(source, columns)
+    thermal = read_thermal(source, columns)
     tell(f"compensating {thermal}")
     try:
         audited = (

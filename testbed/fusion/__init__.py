@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import ArrayLike
 
@@ -41,19 +41,20 @@ def list_filters() -> list[str]:
 
 
 def estimate(
-    name: str,
+    name: str | type[Any],
     readings: Mapping[str, ArrayLike],
     *,
     sample_rate_hz: Mapping[str, float],
     belief: Mapping[str, Any] | str | None = None,
+    plugins: Iterable[str] = (),
     **parameters: Any,
 ) -> EstimateBlock:
     """Run the filter `name` over whole records, such as from one's own logger.
 
     Parameters
     ----------
-    name : str
-        Registered filter, or ``package.module:Class``.
+    name : str or type
+        Registered filter, a class of one's own, or ``module:Class`` of a plug-in.
     readings : mapping of str to array_like, shape (n_sensor_samples,)
         Readings of each sensor [rad/s]; all start at t = 0. Not finite means no reading. A sensor at 1/s of the fastest
         rate has ceil(n / s) readings for n of the fastest; nothing is trimmed.
@@ -62,8 +63,10 @@ def estimate(
     belief : mapping or str, optional
         What the filter believes about each sensor, or the name of a shipped belief; default equation (39) with the
         presets' noise.
+    plugins : iterable of str, optional
+        Modules that are loaded first, dotted or as paths of ``.py`` files, besides those of ``TESTBED_PLUGINS``.
     **parameters : Any
-        Fields of the filter's ``Parameters``, SI floats or strings with units.
+        Fields of the filter's ``Parameters``, SI floats or strings with units; a class without them gets the mapping.
 
     Returns
     -------
@@ -76,6 +79,8 @@ def estimate(
         If no such filter or belief exists.
     ValueError
         If a parameter, a rate or the length of a record is wrong.
+    RunError
+        If a filter that is not shipped raises anything, or gives what is no estimate.
 
     Examples
     --------
@@ -89,13 +94,17 @@ def estimate(
     ((20000,), True, True)
     """
     from testbed.fusion.belief import default_belief, load_belief
+    from testbed.fusion.checked import CheckedFilter
+    from testbed.inputs.plugins import load_plugins
     from testbed.parts import resolve
 
     kind = "filter"
-    cls = resolve(kind, name, FILTERS)
+    cls = resolve(kind, name, FILTERS, load_plugins(plugins)) if isinstance(name, str) else name
     believed = default_belief() if belief is None else load_belief(belief)
-    block: EstimateBlock = cls(believed, sample_rate_hz, cls.Parameters(**parameters)).process(readings)
-    return block
+    model = getattr(cls, "Parameters", dict)
+    inner = cls(believed, sample_rate_hz, model(**parameters))
+    label, shipped = (name, name in FILTERS) if isinstance(name, str) else (cls.__qualname__, False)
+    return CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped).process(readings)
 
 
 def __getattr__(name: str) -> Any:

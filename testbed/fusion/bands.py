@@ -138,15 +138,15 @@ def calibrate_bands(
     freq, level = np.asarray(freq_hz, float), np.asarray(increments, float)
     if not (np.all(np.diff(freq) > 0.0) and freq[0] <= edges_hz[0] < edges_hz[1] <= freq[-1]):
         msg = (
-            f"edges_hz: expected two rising frequencies within a rising sweep of {freq[0]:g} to {freq[-1]:g} Hz, "
-            f"got {edges_hz}"
+            "edges_hz: "
+            f"expected two rising frequencies within a rising sweep of {freq[0]:g} to {freq[-1]:g} Hz, got {edges_hz}"
         )
         raise ValueError(msg)
     low, high = np.exp(np.interp(np.log(edges_hz), np.log(freq), np.log(level)))
     if not low < high:
         msg = (
-            f"increments: expected to rise from {edges_hz[0]:g} to {edges_hz[1]:g} Hz, got {low:g} and {high:g} "
-            f"rad^2/s^2"
+            f"increments: expected to rise from {edges_hz[0]:g} to {edges_hz[1]:g} Hz, "
+            f"got {low:g} and {high:g} rad^2/s^2"
         )
         raise ValueError(msg)
     return float(low), float(high)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 
 from testbed.fusion.belief import check_belief
 from testbed.fusion.coloured import slow_noise
@@ -26,6 +26,7 @@ from testbed.fusion.start import (
     own_covariance,
     unknown_spread,
 )
+from testbed.signals import van_loan
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -244,45 +245,13 @@ def continuous_model(
         if use_input_noise and sensor.input_noise > 0.0:
             if one.D != 0.0:
                 msg = (
-                    f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; give it as output_noise, "
-                    f"or add a pole"
+                    f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; "
+                    "give it as output_noise, or add a pole"
                 )
                 raise ValueError(msg)
             Qc[part, part] = sensor.input_noise**2 * np.outer(one.B, one.B)
         at = part.stop
     return A, Qc, H
-
-
-def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, FloatArray]:
-    r"""Discretise x' = A x + white noise of density Qc over a step T.
-
-    .. math:: F = e^{A T}, \quad Q = \int_0^T e^{A s} Q_c e^{A' s} ds
-
-    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or
-    cancel otherwise.
-
-    Parameters
-    ----------
-    A, Qc : ndarray, shape (n_state, n_state)
-        Dynamics [1/s] and density of the white noise [state^2/s].
-    T : float
-        Step [s].
-
-    Returns
-    -------
-    F, Q : ndarray, shape (n_state, n_state)
-        Transition [-] and covariance [state^2], symmetric.
-    """
-    n = A.shape[0]
-    doublings = max(0, math.ceil(math.log2(max(float(np.linalg.norm(A, 1)) * T, 1e-300))))
-    step = T / 2**doublings
-    power = expm(np.block([[-A, Qc], [np.zeros((n, n)), A.T]]) * step)
-    F: FloatArray = power[n:, n:].T.copy()
-    Q: FloatArray = F @ power[:n, n:]
-    for _ in range(doublings):
-        Q = Q + F @ Q @ F.T
-        F = F @ F
-    return F, 0.5 * (Q + Q.T)
 
 
 def covariance_root(P: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.base import BlockFilter, CommonParameters
+from testbed.fusion.base import BlockFilter, CommonParameters, Switch
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.units import Quantity
@@ -57,7 +57,7 @@ class FilterParameters(CommonParameters):
     order: Annotated[int, Field(ge=1, le=3)] = 1
     q: Annotated[float, Field(validate_default=True, json_schema_extra=_Q_SCHEMA)] = cast("float", None)
     use_input_noise: bool = True
-    coloured: bool = False
+    coloured: Switch = False
 
     @field_validator("q", mode="before")
     @classmethod

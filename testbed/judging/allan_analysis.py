@@ -14,6 +14,8 @@ from testbed import units
 from testbed.allan import AllanCurve, AllanFit, allan_deviation, fit_allan
 from testbed.allan.fit import judge_fit, term_variance
 from testbed.errors import Problem, ScenarioError
+from testbed.judging.allan_words import data_sheet, remarks_on
+from testbed.judging.rounding import is_rounding, rounding_text, without_rounding
 from testbed.pages.numbers import significant
 from testbed.pages.palette import FILTERS, SENSORS
 from testbed.pages.svg import INK, STYLE
@@ -88,8 +90,15 @@ class Analysis:
         coefficient: Coefficient = getattr(self.fit, term.name)
         return coefficient
 
+    @property
+    def given(self) -> bool:
+        """Whether the coefficients mean something."""
+        return self.fit.goodness.accepted and not is_rounding(self.record)
+
     def verdict(self) -> str:
         """Return what the goodness of fit says, in a sentence."""
+        if is_rounding(self.record):
+            return rounding_text(self.record)
         worth = self.fit.goodness
         low, high = self.fitted.tau[[0, -1]]
         numbers = (
@@ -118,9 +127,16 @@ class Analysis:
             "freedom": worth.freedom,
             "p_value": worth.p_value,
             "worst_tau_s": worth.worst_tau,
-            "coefficients": {term.letter: term.summary(self.fit) for term in TERMS} if worth.accepted else None,
+            "coefficients": self._coefficients() if self.given else None,
+            "verdict": self.verdict(),
+            "remarks": remarks_on(self),
+            "n_missing": int(np.count_nonzero(np.isnan(self.record.rate))),
             "curve": {"tau_s": curve.tau.tolist(), **{f"{name}_deg_h": values for name, values in columns.items()}},
         }
+
+    def _coefficients(self) -> dict[str, dict[str, Any]]:
+        sheet = data_sheet(self)
+        return {term.letter: {**term.summary(self.fit), **sheet.get(term.letter, {})} for term in TERMS}
 
     def _advice(self) -> str:
         """Propose the widest range, cut at one end, over which the model holds, with a margin."""
@@ -160,9 +176,17 @@ def analyse(record: Record, min_tau: float | None = None, max_tau: float | None 
         If the record is too short or constant, or the range too narrow.
     """
     try:
-        curve = allan_deviation(record.rate, record.sample_rate_hz)
+        curve = without_rounding(allan_deviation(record.rate, record.sample_rate_hz), record)
     except ValueError as error:
         raise ScenarioError([Problem(str(error), file=record.content)]) from error
+    if not np.all(curve.deviation > 0.0) and is_rounding(record):
+        raise ScenarioError([Problem(rounding_text(record), file=record.content)])
+    if np.nanmin(record.rate) == np.nanmax(record.rate):
+        what = f"all readings are {np.degrees(np.nanmin(record.rate)):g} deg/s"
+        msg = (
+            f"expected noise, {what}: rounded to words above the noise, or not moving at all; record with a finer range"
+        )
+        raise ScenarioError([Problem(msg, file=record.content)])
     if not np.all(curve.deviation > 0.0):
         silent = curve.tau[np.argmin(curve.deviation)]
         raise ScenarioError([Problem(f"expected noise, got no deviation at all at {silent:g} s", file=record.content)])
@@ -202,7 +226,7 @@ def allan_figure(analyses: Sequence[Analysis]) -> Figure:
 
 def _draw(axes: Axes, analysis: Analysis) -> None:
     hour = units.parse("1 deg/h", "rad/s")
-    curve, accepted = analysis.curve, analysis.fit.goodness.accepted
+    curve, accepted = analysis.curve, analysis.given
     axes.fill_between(
         curve.tau, curve.lower / hour, curve.upper / hour, color=SENSORS[0], alpha=0.25, linewidth=0, label="95 % band"
     )

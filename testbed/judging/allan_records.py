@@ -82,7 +82,7 @@ def read(
         raise refusal(source, "expected a run folder with it", "--sensor")
     if not source.is_file():
         raise refusal(source, "expected a recording or a run folder, got neither")
-    channels = [channel.rate() for channel in select(source, wanted, text)]
+    channels = select(source, wanted, text)
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
@@ -92,7 +92,7 @@ def as_record(channel: LogChannel, name: str) -> Record:
     Parameters
     ----------
     channel : LogChannel
-        A rate.
+        A rate, or increments or an angle.
     name : str
         For titles and file names.
 
@@ -101,15 +101,11 @@ def as_record(channel: LogChannel, name: str) -> Record:
     ScenarioError
         If its samples are not even.
     """
-    values = channel.even()
-    return Record(
-        name,
-        values,
-        channel.rate_hz,
-        f"{channel.label} of {channel.table.path}",
-        tuple(remarks(channel)),
-        word_of(channel),
-    )
+    rate = channel.rate()
+    content = f"{channel.label} of {channel.table.path}"
+    # The rounding of increments and angles is no noise of its own in each sample of the rate.
+    word = word_of(channel) if channel.kind == "rate" else 0.0
+    return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
 
 
 def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
@@ -135,10 +131,13 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         If it is no run folder, or the sensor is not in it or was never read.
     """
     from testbed.runs.results import RunRecord
-    from testbed.scenario.loader import load_scenario
+    from testbed.scenario.loader import load_instruments
 
     run = RunRecord.open(folder)
-    scenario = load_scenario(folder / "scenario.yaml")
+    scenario = load_instruments(folder / "scenario.yaml")
+    if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
+        msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"
+        raise refusal(folder, msg, f"sensors.{sensor}")
     if sensor is not None and sensor not in scenario.sensors:
         raise refusal(folder, str(UnknownNameError("sensor", sensor, scenario.sensors)), "--sensor")
     records = []
@@ -158,6 +157,9 @@ def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> Fl
     from testbed.sensors.base import ExposedStage, Surroundings
 
     instrument, base = scenario.sensors[name], scenario.base_rate_hz
+    if true_rate.size != scenario.n_time:
+        # A sensor of a plug-in, which is not read here, asked for another clock.
+        base = true_rate.size / scenario.frame.duration
     stage = instrument.model_copy(update={"noise": False}).start(base, scenario.frame.seed, name)
     if not isinstance(stage, ExposedStage):
         return stage.process(true_rate)

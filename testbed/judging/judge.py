@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -115,6 +116,7 @@ class Judge:
             "budget": budget_summary(psds, frame.bandwidth) if psds else None,
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)
 

@@ -24,6 +24,8 @@ HEAD = 1 << 20
 MOST_COLUMNS = 10_000
 COMMENTS = ("#", "%", "//")
 _SAMPLE, _MANY = 200, 10
+# Characters of a name or of a line of the preamble: more say nothing to a reader.
+_LONGEST = 200
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 _WORDS = {"tab": "\t", "\\t": "\t", "blank": " ", "space": " "}
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
@@ -149,7 +151,10 @@ def find_encoding(path: Path, head: bytes) -> str:
 def fields_of(text: str, separator: str) -> list[str]:
     """Return the fields of a line without the blanks around them."""
     if separator == " ":
-        return re.sub(r"\s+(?=[\[(])", "\0", text.strip()).split()
+        # A unit in brackets belongs to the name before it.
+        closed = ("[" in text and "]" in text) or ("(" in text and ")" in text)
+        joined = text.strip().replace(" [", "\0[").replace(" (", "\0(") if closed else text
+        return [field.replace("\0", " ") for field in joined.split()]
     if '"' not in text:
         return [field.strip() for field in text.split(separator)]
     return [field.strip() for field in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [""])]
@@ -268,8 +273,8 @@ def _parts(
         decimal=decimal,
         skip=first - 1,
         n_columns=n_columns,
-        names=tuple(names[:n_named]),
-        units=tuple(clean_unit(unit) for unit in unit_line[1][:n_named]) if unit_line else (),
+        names=tuple(name[:_LONGEST] for name in names[:n_named]),
+        units=tuple(clean_unit(unit[:_LONGEST]) for unit in unit_line[1][:n_named]) if unit_line else (),
         kinds=tuple(kinds[:n_named]),
         preamble=_preamble([text for number, text in lines if number < (header_line or first)]),
         header_line=header_line,
@@ -324,7 +329,7 @@ def _header(
 
 
 def _is_unit(cell: str) -> bool:
-    return bool(_UNITLESS.fullmatch(cell) or quantity_of(clean_unit(cell)) or "/s" in cell)
+    return bool(_UNITLESS.fullmatch(cell) or quantity_of(clean_unit(cell[:_LONGEST])) or "/s" in cell)
 
 
 def _commented(lines: list[tuple[int, str]], first: int, separator: str, n_named: int) -> tuple[list[str], int | None]:
@@ -344,7 +349,7 @@ def _preamble(lines: list[str]) -> dict[str, str]:
     """Return what ``key,value``, ``key: value`` and ``key = value`` lines say."""
     found = {}
     for line in lines:
-        match = re.match(r"\s*(?:#|%|//)?\s*([^,;:=\t]+?)\s*[,;:=\t]\s*(.+?)[\s,;]*$", line)
+        match = re.match(r"\s*(?:#|%|//)?\s*([^,;:=\t]+?)\s*[,;:=\t]\s*(.+?)[\s,;]*$", line[:_LONGEST])
         if match:
             found[match[1].strip()] = match[2].strip()
     return found

@@ -168,4 +168,5 @@ def _open_extra(path: Path, name: str) -> Table:
     except ImportError as error:
         message = f"is {name}, for which {library} is needed: pip install 'angular-rate-testbed[logs]'"
         raise refusal(path, message) from error
-    return cast("Table", import_module(f"testbed.logs.readers.{module}").open_file(path, name))
+    opened = getattr(import_module(f"testbed.logs.readers.{module}"), f"open_{module}")
+    return cast("Table", opened(path, name))

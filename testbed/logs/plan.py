@@ -27,7 +27,7 @@ _COUNTS = re.compile(r"(lsb|counts?|digits?|raw|adc)", re.IGNORECASE)
 _RATES = re.compile(r"(f_?s|odr|rate_?hz|(sample|sampling|data)[ _-]?(rate|freq\w*)([ _\[(]*hz[\])]?)?)", re.IGNORECASE)
 # Numbers that are a date in one unit only: 1990 to 2100.
 _EPOCH_S = (6.3e8, 4.2e9)
-_PREFERRED = ("timestamp_sample",)
+_PREFERRED = ("timestamp_sample", "header.stamp")
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from testbed.errors import RunError
+from testbed.inputs.plugins import PluginError, running
 from testbed.parts import Part
 from testbed.signals import FloatArray, sample_times
 
@@ -20,7 +22,12 @@ RateFunction = Callable[[FloatArray], FloatArray]
 
 
 class Motion(Part):
-    """One term of the commanded motion."""
+    """One term of the commanded motion.
+
+    `example` is how a scenario may write it: the schema offers it, and the contract tests run on it.
+    """
+
+    example: ClassVar[dict[str, Any]] = {}
 
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the commanded rate [rad/s] as a pure function of time [s], shape (n_time,) -> (n_time,).
@@ -53,6 +60,10 @@ class Motion(Part):
     def top_frequency(self) -> float:
         """Return the highest frequency [Hz] that the term contains."""
         raise NotImplementedError
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the rate."""
+        return max(len(self.lines()), 1)
 
 
 @dataclass(frozen=True)
@@ -106,6 +117,46 @@ def ramp(t: FloatArray, length: float) -> FloatArray:
     return factor
 
 
+def watched(kind: str, motion: Motion, duration: float, rng: np.random.Generator) -> RateFunction:
+    """Start a motion of a plug-in and return its rate, which is checked whenever it is asked for.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the motion, for messages.
+    motion : Motion
+        To start.
+    duration : float
+        Length of the run [s].
+    rng : numpy.random.Generator
+        For the motion.
+
+    Raises
+    ------
+    RunError
+        If the motion raises anything; the returned function does too, and if a rate is not finite or has not one value
+        per time.
+    """
+
+    def rate(t: FloatArray) -> FloatArray:
+        value = np.asarray(_foreign(kind, lambda: term(t.copy())))
+        if value.shape != t.shape or value.dtype.kind != "f" or not np.isfinite(value).all():
+            msg = f"motion {kind}: expected finite rates of shape {t.shape}, got {value.dtype} of shape {value.shape}"
+            raise RunError(msg)
+        return value
+
+    term = _foreign(kind, lambda: motion.start(duration, rng))
+    return rate
+
+
+def _foreign(kind: str, call: Callable[[], Any]) -> Any:
+    try:
+        with running(f"motion {kind}"):
+            return call()
+    except PluginError as error:
+        raise RunError(str(error)) from error
+
+
 class MotionProfile:
     """The commanded motion of a run, block by block.
 
@@ -139,19 +190,22 @@ class MotionProfile:
 
     def process(self, n_time: int) -> CommandBlock:
         """Return the next `n_time` steps."""
-        block = self.peek(n_time)
+        block = self._block(self._start, n_time, self._angle)
         self._start += n_time
         self._angle = float(block.angle[-1])
         return block
 
-    def peek(self, n_time: int) -> CommandBlock:
-        """Return the next `n_time` steps and stay before them."""
+    def peek(self, n_time: int, start: int | None = None) -> CommandBlock:
+        """Return the next `n_time` steps, or those from `start` on with angles from zero, and stay before them."""
+        return self._block(self._start, n_time, self._angle) if start is None else self._block(start, n_time, 0.0)
+
+    def _block(self, start: int, n_time: int, angle_before: float) -> CommandBlock:
         h = 1.0 / self._sample_rate_hz
-        half_steps = self.rate(sample_times(2 * self._start, 2 * n_time + 1, 2.0 * self._sample_rate_hz))
+        half_steps = self.rate(sample_times(2 * start, 2 * n_time + 1, 2.0 * self._sample_rate_hz))
         w0, wm, w1 = half_steps[:-1:2], half_steps[1::2], half_steps[2::2]
-        angle = np.cumsum(np.concatenate([[self._angle], (w0 + 4.0 * wm + w1) * (h / 6.0)]))
+        angle = np.cumsum(np.concatenate([[angle_before], (w0 + 4.0 * wm + w1) * (h / 6.0)]))
         return CommandBlock(
-            start=self._start,
+            start=start,
             rate=half_steps[::2].copy(),
             angle=angle,
             rate_mid=wm.copy(),

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from testbed.notebook.figures import Figures
 
 
 class Run(RunRecord):
@@ -23,13 +24,15 @@ class Run(RunRecord):
     in memory only. A run copies and pickles; one on disk stays a reference to its folder.
     """
 
-    def plot(self) -> dict[str, Figure]:
+    def plot(self) -> Figures:
         """Return the figures of the report by name: `rates`, `errors`, `spectrum`, and `thermal`, `budget` where there
-        is something to draw.
+        is something to draw. Each is a matplotlib figure; a notebook shows them all.
         """
+        # Drawing is heavy, and of no use to a run that is only computed.
+        from testbed.notebook.figures import Figures
         from testbed.report import run_figures
 
-        return run_figures(self)
+        return Figures(run_figures(self))
 
     def to_xarray(self) -> xr.DataTree:
         """Return the signals as a tree with the groups of run.nc, each variable with its unit and long name.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 APPLICATION = "testbed"
 FULL = 1 << 20  # bytes; with less room than this a disk is called full
+LET_GO_TIMEOUT = 2.0  # s; closing takes milliseconds
 FLUSH_TIMEOUT = 60.0  # s; a disk slower than this for the last few MB is taken for a failure
 
 
@@ -145,7 +148,7 @@ class RecordingWriter:
         self._stream.send_blueprint(self._blueprint())
         try:
             # Only flush reports a full disk; disconnect is silent about it.
-            self._stream.flush(timeout_sec=FLUSH_TIMEOUT)
+            self._flush()
             self._stream.disconnect()
             RrdReader(self._path).store()
         except (RuntimeError, OSError, ValueError) as error:
@@ -156,9 +159,36 @@ class RecordingWriter:
     def abort(self) -> None:
         """Give the recording up and remove its file."""
         self._open = False
-        self._stream.disconnect()
+        self._let_go()
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
+
+    def _flush(self) -> None:
+        """Wait until all is written, or until it is clear that it will not be: a writer that met a full disk may answer
+        no more.
+        """
+        deadline = time.monotonic() + FLUSH_TIMEOUT
+        while True:
+            try:
+                self._stream.flush(timeout_sec=LET_GO_TIMEOUT)
+            except RuntimeError:
+                if self._is_full() or time.monotonic() > deadline:
+                    raise
+            else:
+                return
+
+    def _is_full(self) -> bool:
+        return shutil.disk_usage(self._path.parent).free < FULL
+
+    def _let_go(self) -> None:
+        """Close what the library holds, and do not wait for it forever: on a full disk it now and then waits for a
+        thread of its own that has ended.
+        """
+        closing = threading.Thread(target=self._stream.disconnect, daemon=True)
+        closing.start()
+        closing.join(LET_GO_TIMEOUT)
+        if closing.is_alive():
+            rr.unregister_shutdown()
 
     def __enter__(self) -> Self:
         return self

@@ -108,7 +108,8 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
     drawn = {"rates": rates_figure(digest, colors)}
     if digest.filter_errors:
         drawn["errors"] = errors_figure(digest, colors)
-    drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
+    if metrics.sources:
+        drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors)
     if metrics.budget is not None:

@@ -16,10 +16,11 @@ from testbed.pages.numbers import plain, significant
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
 
+    from testbed.pages.envelope import Envelope
     from testbed.report.digest import Digest, ErrorTrace
     from testbed.runs.metrics import FloorDensity
 
@@ -49,8 +50,7 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
     Figure
         Two axes, deg/s against s; deg/h for slow rates, and hours for a long run.
     """
-    highest = max(np.nanmax(np.fmax(np.abs(t.whole.low), np.abs(t.whole.high))) for t in digest.rates.values())
-    unit, scale = rate_unit(float(highest))
+    unit, scale = rate_unit(_highest([trace.whole for trace in digest.rates.values()]))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 5.4))
         above, below = figure.subplots(2, 1, height_ratios=[2, 3])
@@ -86,6 +86,12 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
         arrange(figure, [dotted, *handles] if moved else handles, gap_in=0.62)
     return figure
+
+
+def _highest(envelopes: Sequence[Envelope]) -> float:
+    """Return the largest size in any of them, 0 where nothing is finite (every reading lost)."""
+    extremes = np.abs(np.concatenate([ends for one in envelopes for ends in (one.low, one.high)]))
+    return float(np.max(extremes, where=np.isfinite(extremes), initial=0.0))
 
 
 def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
@@ -260,7 +266,7 @@ def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         Two axes, degC and deg/h (or deg/s) against s or h.
     """
     errors = {name: digest.sensor_errors[name].whole for name in digest.thermal}
-    unit, scale = rate_unit(max(float(np.nanmax(np.fmax(-error.low, error.high))) for error in errors.values()))
+    unit, scale = rate_unit(_highest(list(errors.values())))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 5.0))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 3])

@@ -64,7 +64,7 @@ def _accuracy(metrics: RunMetrics) -> list[str]:
     )
     text = [f"{among}: its error is {significant(rmse)} deg/s rms, phase included."]
     alone = metrics.sensors[sensor].rmse_deg_s if sensor else None
-    if alone is not None and rmse > 0:
+    if alone and rmse > 0:
         factor = alone / rmse
         compared = f"{significant(factor)} times smaller" if factor >= 1 else f"{significant(1 / factor)} times larger"
         text.append(

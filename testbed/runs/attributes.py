@@ -69,10 +69,11 @@ def provenance(scenario: str, seed: int, versions: Mapping[str, str]) -> dict[st
     return {
         "Conventions": CONVENTIONS,
         "title": scenario,
-        "source": f"testbed {versions.get('testbed', '')}, simulation".replace(" ,", ","),
+        "source": f"testbed {versions['testbed']}, simulation",
         "scenario": scenario,
         "seed": seed,
-        **{f"{name}_version": version for name, version in versions.items()},
+        # A name of CF has no hyphen.
+        **{f"{name.replace('-', '_')}_version": version for name, version in versions.items()},
     }
 
 

@@ -184,6 +184,7 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     expectations: list[Expectation] = []
     versions: dict[str, Any] = {}
+    plugins: list[dict[str, Any]] = []
 
     @property
     def sources(self) -> dict[str, SourceMetrics]:

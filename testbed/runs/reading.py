@@ -89,10 +89,10 @@ def _sample_rate(path: Path, key: str, node: Any) -> float:
     """Return the rate that the group states, held against its time; of a file that states none, that of its time."""
     time, stated = node["time"], node.attrs.get("sample_rate_hz")
     n = int(time.shape[0])
-    if n < 2:
-        raise _bad(path, key, f"expected at least 2 samples, got {n}")
+    if n < (1 if stated is not None else 2):
+        raise _bad(path, key, f"expected samples, and two of them or their sample_rate_hz, got {n}")
     first, last = float(time[0]), float(time[-1])
-    if first != 0.0 or not last > 0.0:
+    if first != 0.0 or not (last > 0.0 or n == 1):
         raise _bad(path, key, f"expected time from 0 s on, increasing, got {first} s to {last} s")
     rate = (n - 1) / last if stated is None else float(np.ravel(stated)[0])
     # A drift of half a sample over the run is no rounding.

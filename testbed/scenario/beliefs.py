@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.analysis.identify import identify
-from testbed.fusion.belief import load_belief
+from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.parts import preset
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:
-    from testbed.fusion.belief import SensorBelief
     from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
-# The word for the simulator's own response and noise.
+# The word for the simulator's own response and noise, and that for what a preset itself says.
 EXACT = "exact"
+DATA_SHEET = "data_sheet"
 
 _LOWEST_HZ, _POINTS = 1e-2, 121
 _FIT_MISFIT = 1e-3
@@ -92,7 +92,30 @@ def preset_belief(name: str) -> SensorBelief | None:
         If there is no such preset.
     """
     content = preset("testbed.sensors", name)
+    if content.get("belief") == DATA_SHEET:
+        return sheet_belief(load_preset(name))
     return load_belief(content["belief"])[content["type"]] if "belief" in content else None
+
+
+def sheet_belief(sensor: Sensor) -> SensorBelief:
+    """Return what the data sheet of an instrument says of it.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The instrument, given in the words of its data sheet.
+
+    Returns
+    -------
+    SensorBelief
+        With `source` "data_sheet".
+
+    Raises
+    ------
+    ValueError
+        If it is of a kind whose data sheet says too little.
+    """
+    return SensorBelief(**sensor.sheet_belief(), source=DATA_SHEET)
 
 
 def exact_belief(sensor: Sensor) -> SensorBelief:

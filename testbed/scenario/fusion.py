@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 from testbed.errors import UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
-from testbed.parts import resolve
 from testbed.scenario.beliefs import EXACT, exact_belief
 from testbed.scenario.entries import is_name, kind_of, mapping
+from testbed.scenario.intake import unresolved
 from testbed.scenario.model import FilterSpec
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
-    from testbed.document import Document, Key
-    from testbed.models.turntable.turntable import TurntableParameters
+    from testbed.document import Key
+    from testbed.models.turntable.parameters import TurntableParameters
+    from testbed.scenario.intake import Intake
     from testbed.sensors.base import Sensor
 
 _REMEDY = "write 'belief: exact' for the simulator's own response and noise, or what is believed of it"
@@ -30,10 +30,8 @@ class Fusion:
 
     Parameters
     ----------
-    document : Document
-        Takes the findings.
-    folder : Path
-        Of the scenario's file.
+    intake : Intake
+        Takes the findings, and knows what may be named.
     sensors, types : mapping of str to Sensor, of str to str
         The instruments that could be built, and the types of all.
     data_sheets : mapping of str to SensorBelief or None
@@ -42,8 +40,7 @@ class Fusion:
         What carries them, which rests at t = 0.
     """
 
-    document: Document
-    folder: Path
+    intake: Intake
     sensors: Mapping[str, Sensor]
     types: Mapping[str, str]
     data_sheets: Mapping[str, SensorBelief | None]
@@ -52,31 +49,40 @@ class Fusion:
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
         specs = {}
-        for name, entry in mapping(self.document, data, ("fusion",)).items():
+        for name, entry in mapping(self.intake.document, data, ("fusion",)).items():
             key = ("fusion", name)
-            if is_name(self.document, name, key):
-                spec = self._filter(name, dict(mapping(self.document, entry, key)), key)
+            if is_name(self.intake.document, name, key):
+                spec = self._filter(name, dict(mapping(self.intake.document, entry, key)), key)
                 if spec is not None:
                     specs[name] = spec
         return specs
 
     def _filter(self, name: str, entry: dict[str, Any], key: Key) -> FilterSpec | None:
-        kind = kind_of(self.document, entry.pop("type", name), key)
+        kind = kind_of(self.intake.document, entry.pop("type", name), key)
         written = entry.pop("belief", None)
         if kind is None:
             return None
         try:
-            factory = resolve("filter", kind, FILTERS)
+            factory = self.intake.resolve("filter", kind, FILTERS, object)
         except UnknownNameError as error:
-            self.document.find((*key, "type"), f"{error}; say which with 'type:'")
+            self._find((*key, "type"), unresolved(error, kind))
             return None
         belief = self._belief(written, (*key, "belief"))
         model = getattr(factory, "Parameters", None)
         entry = {**self._at_rest(model, entry), **entry}
-        parameters = entry if model is None else self.document.validate(model, entry, key, self.folder)
+        parameters = entry if model is None else self.intake.validate(model, entry, key, shipped=kind in FILTERS)
         if parameters is None or belief is None:
             return None
-        return FilterSpec(kind, factory, parameters, belief)
+        return FilterSpec(kind, factory, parameters, self._without_rounding(belief))
+
+    def _without_rounding(self, belief: Mapping[str, SensorBelief]) -> dict[str, SensorBelief]:
+        """Return the belief without a step of the readings for sensors without noise: they do not round, and rightly
+        repeat themselves at rest.
+        """
+        silent = {name for name, sensor in self.sensors.items() if not sensor.noise}
+        return {
+            name: one.model_copy(update={"resolution": None}) if name in silent else one for name, one in belief.items()
+        }
 
     def _at_rest(self, model: Any, entry: Mapping[str, Any]) -> dict[str, str]:
         """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at
@@ -86,6 +92,9 @@ class Fusion:
             return {}
         earth = None if self.turntable is None else self.turntable.earth_rate
         return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
+
+    def _find(self, key: Key, message: str) -> None:
+        self.intake.document.find(key, message)
 
     def _belief(self, written: Any, key: Key) -> dict[str, SensorBelief] | None:
         """Return what a filter believes of each sensor; None, with the findings noted, if not of all."""
@@ -101,7 +110,7 @@ class Fusion:
         for name in self.types:
             one = self.data_sheets.get(name)
             if one is None:
-                self.document.find(key, f"nothing is known of sensor {name!r}: no data sheet of a preset; {_REMEDY}")
+                self._find(key, f"nothing is known of sensor {name!r}: no data sheet of a preset; {_REMEDY}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None
@@ -112,7 +121,7 @@ class Fusion:
             try:
                 belief[name] = exact_belief(sensor)
             except ValueError as error:
-                self.document.find(key, f"{name}: {error}")
+                self._find(key, f"{name}: {error}")
         return belief if len(belief) == len(self.types) else None
 
     def _of_types(self, known: Mapping[str, SensorBelief], key: Key) -> dict[str, SensorBelief] | None:
@@ -122,7 +131,7 @@ class Fusion:
             one = known.get(name, known.get(kind))
             if one is None:
                 words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                self.document.find(key, f"{words}; {_REMEDY}")
+                self._find(key, f"{words}; {_REMEDY}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None
@@ -133,14 +142,11 @@ class Fusion:
             try:
                 return load_belief(written)
             except UnknownNameError as error:
-                self.document.find(key, str(error))
+                self._find(key, str(error))
                 return None
         if not isinstance(written, dict):
-            self.document.find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
+            self._find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
             return None
-        read = {
-            str(name): self.document.validate(SensorBelief, value, (*key, name), self.folder)
-            for name, value in written.items()
-        }
+        read = {str(name): self.intake.validate(SensorBelief, value, (*key, name)) for name, value in written.items()}
         known = {name: one for name, one in read.items() if one is not None}
         return known if len(known) == len(read) else None

@@ -9,31 +9,40 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document, unknown_key
 from testbed.errors import ScenarioError, UnknownNameError, quoted
+from testbed.inputs.plugins import Plugins, load_plugins
+from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
-from testbed.models.turntable.turntable import TurntableParameters
-from testbed.parts import merge, preset, resolve
+from testbed.models.turntable.parameters import TurntableParameters
+from testbed.parts import merge, preset
 from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
 from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.fusion import Fusion
+from testbed.scenario.intake import Intake, unresolved
 from testbed.scenario.model import Bound, Frame, Scenario
-from testbed.sensors import SENSORS
+from testbed.sensors import SENSORS, with_preset
+from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from testbed.fusion.belief import SensorBelief
-    from testbed.models.motion import Motion
-    from testbed.sensors.base import Sensor
 
 _BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
 
 
-def load_scenario(path: str | Path) -> Scenario:
+def load_scenario(path: str | Path, *, plugins: Iterable[str] = (), allow_outside: bool = False) -> Scenario:
     """Read and validate a scenario.
 
     Parameters
     ----------
     path : str or Path
         A YAML 1.2 file; every dimensional value is a string with its unit.
+    plugins : iterable of str, optional
+        Modules, dotted or as paths of ``.py`` files, that are loaded first and whose classes the scenario may name as
+        ``module:Class``; those of the environment variable ``TESTBED_PLUGINS`` besides.
+    allow_outside : bool, optional
+        Whether a recorded motion may lie outside the scenario's folder.
 
     Returns
     -------
@@ -51,7 +60,8 @@ def load_scenario(path: str | Path) -> Scenario:
     Traceback (most recent call last):
     testbed.errors.ScenarioError: no.yaml: cannot be read: No such file or directory
     """
-    return read_document(Document(Path(path)), Path(path).resolve().parent)
+    loaded = load_plugins(plugins)
+    return read_document(Intake(Document(Path(path)), Path(path).resolve().parent, loaded, allow_outside))
 
 
 def as_scenario(given: object) -> Scenario:
@@ -77,51 +87,87 @@ def as_scenario(given: object) -> Scenario:
     raise ScenarioError(msg)
 
 
-def read_document(document: Document, folder: Path) -> Scenario:
+def read_document(intake: Intake) -> Scenario:
     """Validate the content of a document as a scenario.
 
     Parameters
     ----------
-    document : Document
-        Of a file, or of a mapping built in Python.
-    folder : Path
-        Where relative paths in it begin.
+    intake : Intake
+        The document, of a file or of a mapping built in Python, and the terms on which it is read.
 
     Raises
     ------
     ScenarioError
         With every finding at once.
     """
-    scenario = _Reader(document, folder).scenario()
+    scenario = _Reader(intake).scenario()
+    intake.document.refuse()
+    assert scenario is not None
+    cross_check(scenario, intake.document)
+    intake.document.refuse()
+    return scenario
+
+
+def load_instruments(path: str | Path) -> Scenario:
+    """Read what a finished run's scenario says of frame, table and sensors; no plug-in is loaded.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``scenario.yaml`` of a run folder.
+
+    Returns
+    -------
+    Scenario
+        Without motion, filters, expectations and the sensors of plug-ins.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_scenario`.
+    """
+    document = Document(Path(path))
+    scenario = _Reader(Intake(document, Path(path).resolve().parent, Plugins())).instruments()
     document.refuse()
     assert scenario is not None
-    cross_check(scenario, document)
-    document.refuse()
     return scenario
 
 
 class _Reader:
     """Takes a document apart, part by part, so that every part's errors are found."""
 
-    def __init__(self, document: Document, folder: Path) -> None:
-        self._doc = document
-        self._folder = folder
+    def __init__(self, intake: Intake) -> None:
+        self._intake, self._doc = intake, intake.document
         self._presets: dict[str, Any] = {"sensors": {}}
         self._data_sheets: dict[str, SensorBelief | None] = {}
 
     def scenario(self) -> Scenario | None:
-        data = dict(self._doc.data)
+        """Return the whole scenario; None if something is wrong, which the document knows."""
+        return self._joined(dict(self._doc.data))
+
+    def instruments(self) -> Scenario | None:
+        """Return the scenario without what reading its results does not need."""
+        sensors = mapping(self._doc, self._doc.data.get("sensors"), ("sensors",))
+        kept = {key: value for key, value in self._doc.data.items() if key not in {"fusion", "expect"}}
+        shipped = {
+            name: entry
+            for name, entry in sensors.items()
+            if not isinstance(entry, dict) or str(entry.get("type", name)) in SENSORS
+        }
+        return self._joined({**kept, "sensors": shipped, "motion": [{"static": {}}]})
+
+    def _joined(self, data: dict[str, Any]) -> Scenario | None:
         parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "expect")}
         for key in [key for key in data if key not in Frame.model_fields]:
             self._doc.find((key,), unknown_key(str(key), [*Frame.model_fields, *parts]))
             del data[key]
-        frame = self._doc.validate(Frame, data, (), self._folder)
+        frame = self._intake.validate(Frame, data, ())
         turntable = self._turntable(parts["turntable"])
         motion = self._motion(parts["motion"])
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = Fusion(self._doc, self._folder, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
+        fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
@@ -134,9 +180,11 @@ class _Reader:
             fusion,
             expect,
             self._doc.file,
-            self._folder,
+            self._intake.folder,
             self._doc.data,
             self._presets,
+            self._intake.plugins.used,
+            self._intake.allow_outside,
         )
 
     def _with_preset(
@@ -148,6 +196,8 @@ class _Reader:
         if name is None:
             return rest
         try:
+            if package == "testbed.sensors":
+                return with_preset(str(name), rest)
             return merge(preset(package, str(name)), rest)
         except UnknownNameError as error:
             self._doc.find((*key, "preset"), str(error))
@@ -157,7 +207,7 @@ class _Reader:
         key = ("turntable",)
         merged = self._with_preset(mapping(self._doc, data, key), "testbed.models", key, "air_bearing")
         self._presets["turntable"] = merged or {}
-        return None if merged is None else self._doc.validate(TurntableParameters, merged, key, self._folder)
+        return None if merged is None else self._intake.validate(TurntableParameters, merged, key)
 
     def _motion(self, data: Any) -> tuple[tuple[str, Motion], ...]:
         if not isinstance(data, list) or not data:
@@ -175,11 +225,12 @@ class _Reader:
             return None
         kind, parameters = next(iter(item.items()))
         try:
-            model = resolve("motion", str(kind), MOTIONS)
+            model = self._intake.resolve("motion", str(kind), MOTIONS, Motion)
         except UnknownNameError as error:
             self._doc.find((*key, kind), str(error))
             return None
-        motion = self._doc.validate(model, mapping(self._doc, parameters, (*key, kind)), (*key, kind), self._folder)
+        given = mapping(self._doc, parameters, (*key, kind))
+        motion = self._intake.validate(model, given, (*key, kind), shipped=kind in MOTIONS)
         return None if motion is None else (str(kind), motion)
 
     def _sensors(self, data: Any) -> tuple[dict[str, Sensor], dict[str, str]]:
@@ -201,11 +252,11 @@ class _Reader:
                 continue
             types[name] = kind
             try:
-                model = resolve("sensor", kind, SENSORS)
+                model = self._intake.resolve("sensor", kind, SENSORS, Sensor)
             except UnknownNameError as error:
-                self._doc.find((*key, "type"), f"{error}; say which with 'type:'")
+                self._doc.find((*key, "type"), unresolved(error, kind))
                 continue
-            sensor = self._doc.validate(model, merged, key, self._folder)
+            sensor = self._intake.validate(model, merged, key, shipped=kind in SENSORS)
             if sensor is not None:
                 sensors[name] = sensor
         return sensors, types

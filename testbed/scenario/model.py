@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -10,9 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field
 
 from testbed.document import Document
+from testbed.fusion import FILTERS
 from testbed.fusion.belief import declared
 from testbed.inputs.plain import plain_tree
-from testbed.models.motion import MotionProfile
+from testbed.inputs.plugins import Plugins, load_plugins, running
+from testbed.models.motion import MotionProfile, watched
+from testbed.models.motions import MOTIONS
 from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
 from testbed.scenario.edits import edited
@@ -20,20 +24,23 @@ from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import Duration, Frequency, PositiveDuration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from testbed.fusion.belief import SensorBelief
+    from testbed.inputs.plugins import Plugin
     from testbed.inputs.tree import Tree
     from testbed.models.motion import Motion
     from testbed.models.turntable.floor import FloorMotion
-    from testbed.models.turntable.turntable import TurntableParameters
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
+# What the signed 64 bits of run.nc hold.
+MOST_SEED = 2**63 - 1
 
 
-Seed = Annotated[int, Field(ge=0, strict=True)]
+Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 
 
 class Frame(Part):
@@ -121,13 +128,33 @@ class FilterSpec:
     parameters: Any
     belief: Mapping[str, SensorBelief]
 
+    def start(self, sample_rate_hz: Mapping[str, float]) -> Any:
+        """Return the filter at its beginning.
+
+        Parameters
+        ----------
+        sample_rate_hz : mapping of str to float
+            Rate of each sensor [Hz].
+
+        Raises
+        ------
+        ValueError
+            If belief, rates and parameters do not fit together; PluginError for whatever a plug-in raises.
+        """
+        if self.type in FILTERS:
+            return self.factory(self.belief, sample_rate_hz, self.parameters)
+        # Copies: a plug-in may keep and change what it gets.
+        with running(f"plug-in {self.type}"):
+            return self.factory(dict(self.belief), dict(sample_rate_hz), deepcopy(self.parameters))
+
 
 @dataclass(frozen=True)
 class Scenario:
     """A validated scenario in SI.
 
     `source` is the mapping as written, with the user's units, and `presets` holds the parts that presets filled in;
-    `file` is where it stands, nothing if it was built in Python, and `folder` where relative paths begin.
+    `file` is where it stands, nothing if it was built in Python, and `folder` where relative paths begin, outside of
+    which a recorded motion may lie only with `allow_outside`; `plugins` are those that were loaded for it.
 
     Examples
     --------
@@ -147,6 +174,8 @@ class Scenario:
     folder: Path
     source: Mapping[str, Any] = field(repr=False)
     presets: Mapping[str, Any] = field(repr=False)
+    plugins: tuple[Plugin, ...] = ()
+    allow_outside: bool = False
 
     @property
     def truth_seed(self) -> int:
@@ -204,14 +233,21 @@ class Scenario:
             Length of the ramp-in instead of the scenario's [s].
         """
         duration = self.frame.duration
-        terms = [
-            motion.start(duration, random_stream(self.truth_seed, "motion", str(i), kind))
-            for i, (kind, motion) in enumerate(self.motion)
-        ]
+        terms = []
+        for i, (kind, motion) in enumerate(self.motion):
+            stream = random_stream(self.truth_seed, "motion", str(i), kind)
+            terms.append(motion.start(duration, stream) if kind in MOTIONS else watched(kind, motion, duration, stream))
         return MotionProfile(terms, self.frame.ramp_in if ramp_in is None else ramp_in, self.base_rate_hz)
 
     @classmethod
-    def from_dict(cls, mapping: Mapping[str, Any], folder: str | Path = ".") -> Scenario:
+    def from_dict(
+        cls,
+        mapping: Mapping[str, Any],
+        folder: str | Path = ".",
+        *,
+        plugins: Iterable[str] = (),
+        allow_outside: bool = False,
+    ) -> Scenario:
         """Return the scenario that a mapping describes, validated as a file is.
 
         Parameters
@@ -220,13 +256,15 @@ class Scenario:
             The keys of a scenario file; every dimensional value is a string with its unit.
         folder : str or Path, optional
             Where relative paths in it begin.
+        plugins, allow_outside : iterable of str, bool, optional
+            As for `load_scenario`.
 
         Raises
         ------
         ScenarioError
             With every finding at once: key and what was expected.
         """
-        return _built(plain_tree(mapping), Path(folder), "")
+        return _built(plain_tree(mapping), Path(folder), "", load_plugins(plugins), allow_outside=allow_outside)
 
     def with_(self, **changes: Any) -> Scenario:
         """Return the scenario with other values, validated as a whole.
@@ -243,7 +281,8 @@ class Scenario:
         ScenarioError
             With every finding at once: key and what was expected; also for a key or an index that is not there.
         """
-        return _built(plain_tree(edited(self.source, changes, self.file)), self.folder, self.file)
+        tree, loaded = plain_tree(edited(self.source, changes, self.file)), Plugins(self.plugins)
+        return _built(tree, self.folder, self.file, loaded, allow_outside=self.allow_outside)
 
     def with_seed(self, seed: int) -> Scenario:
         """Return the same scenario under another seed; quick, since nothing else is validated again.
@@ -289,10 +328,11 @@ class Scenario:
         }
 
 
-def _built(tree: Tree, folder: Path, file: str) -> Scenario:
+def _built(tree: Tree, folder: Path, file: str, plugins: Plugins, *, allow_outside: bool) -> Scenario:
+    from testbed.scenario.intake import Intake
     from testbed.scenario.loader import read_document
 
-    return read_document(Document(file, tree=tree), folder.resolve())
+    return read_document(Intake(Document(file, tree=tree), folder.resolve(), plugins, allow_outside))
 
 
 def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def schema() -> dict[str, Any]:
         "motion": {
             "type": "array",
             "minItems": 1,
-            "items": {"oneOf": [_one_key(name, part(resolve("motion", name, MOTIONS))) for name in MOTIONS]},
+            "items": {"oneOf": [_motion(name, part) for name in MOTIONS]},
         },
         "sensors": {
             "type": "object",
@@ -73,7 +73,9 @@ def _optional(model: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in model.items() if key != "required"}
 
 
-def _one_key(name: str, model: dict[str, Any]) -> dict[str, Any]:
+def _motion(name: str, part: Any) -> dict[str, Any]:
+    kind = resolve("motion", name, MOTIONS)
+    model = {**part(kind), "examples": [kind.example]}
     return {"type": "object", "required": [name], "additionalProperties": False, "properties": {name: model}}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,7 @@ def test_filters_know_readings_and_belief_only(tmp_path):
         "kalman",
         {name: group.rate for name, group in run.sensors.items()},
         sample_rate_hz={"mhd_ars": 20_000.0, "mems_gyro": 2_000.0},
+        start="rest",
     )
     assert np.array_equal(est.rate, run.fusion["kalman"].rate)
 
@@ -126,14 +129,23 @@ class Mine:
 """
 
 
-def test_a_users_own_filter_runs_from_yaml_and_its_shapes_are_checked(tmp_path, monkeypatch):
-    (tmp_path / "own_pipeline_filter.py").write_text(OWN_FILTER)
-    monkeypatch.syspath_prepend(tmp_path)
+def test_a_users_own_filter_runs_from_yaml_and_its_shapes_are_checked(tmp_path):
+    own = tmp_path / "own_pipeline_filter.py"
+    own.write_text(OWN_FILTER)
     entry = "  arw_shakf: {type: own_pipeline_filter:Mine, gain: 2.0}"
-    run = testbed.run(short(tmp_path, ("  arw_shakf: {}", entry)))
+    plugins = [str(own)]
+    run = testbed.run(short(tmp_path, ("  arw_shakf: {}", entry), plugins=plugins))
     assert np.array_equal(run.fusion["arw_shakf"].rate, 2.0 * run.sensors["mhd_ars"].rate)
-    with pytest.raises(RunError, match=r"filter arw_shakf: expected rate of shape \(10000,\), got \(9999,\)"):
-        testbed.run(short(tmp_path, ("  arw_shakf: {}", entry.replace("2.0", "2.0, lost: 1"))))
+    (plugin,) = run.metrics["plugins"]
+    assert plugin == {
+        "name": "own_pipeline_filter",
+        "version": None,
+        "sha256": hashlib.sha256(OWN_FILTER.encode()).hexdigest(),
+    }
+    with pytest.raises(
+        RunError, match=r"filter arw_shakf, block 1 .*: expected rate of shape \(10000,\), got \(9999,\)"
+    ):
+        testbed.run(short(tmp_path, ("  arw_shakf: {}", entry.replace("2.0", "2.0, lost: 1")), plugins=plugins))
 
 
 FLOOR = "{floor: {bands: [{axis: rz, low: 2 Hz, high: 80 Hz, angular_acceleration_psd: 1e-6 (rad/s^2)^2/Hz}]}}"

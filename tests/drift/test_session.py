@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import testbed
 from testbed.cli import main
 from testbed.cli.app import app
-from testbed.drift.records import Columns, read
+from testbed.drift.records import Columns, read_thermal
 from testbed.drift.session import read_model
 from testbed.errors import ScenarioError
 
@@ -64,7 +64,7 @@ def table(cycles):
 
 
 def test_a_run_is_read_with_its_true_drift(cycles):
-    run, found = testbed.open_run(cycles / "unseen"), read(cycles / "unseen", Columns())
+    run, found = testbed.open_run(cycles / "unseen"), read_thermal(cycles / "unseen", Columns())
     np.testing.assert_array_equal(found.record.rate, run.sensors["fog"].rate)
     np.testing.assert_array_equal(found.record.temperature, run.sensors["fog"].temperature)
     np.testing.assert_array_equal(found.drift, run.truth["fog_drift"])
@@ -80,7 +80,7 @@ def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
         "sensors: {fog: {preset: fog_paper3}}\n"
     )
     run = testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
-    found = read(tmp_path / "run", Columns())
+    found = read_thermal(tmp_path / "run", Columns())
     expected = np.interp(run.sensors["fog"].time, run.truth.time, run.truth.fog_drift)
     assert found.record.sample_rate_hz == pytest.approx(400.0, rel=1e-9)
     assert found.drift.size == found.record.rate.size == 400
@@ -88,15 +88,15 @@ def test_the_true_drift_of_a_fast_base_is_that_of_the_readings(tmp_path):
 
 
 def test_a_text_file_gives_the_same_record_in_any_units(cycles, table):
-    run = read(cycles / "unseen", Columns()).record
-    by_time = read(table, Columns(time="hours", time_unit="h")).record
-    by_rate = read(table, Columns(sample_rate="0.1 Hz", rate="2", temperature="3")).record
+    run = read_thermal(cycles / "unseen", Columns()).record
+    by_time = read_thermal(table, Columns(time="hours", time_unit="h")).record
+    by_rate = read_thermal(table, Columns(sample_rate="0.1 Hz", rate="2", temperature="3")).record
     for record in (by_time, by_rate):
         # Twelve digits were written; at 10 deg/h that is 1e-11 deg/h.
         np.testing.assert_allclose(record.rate, run.rate, atol=1e-10 * DEG_H)
         np.testing.assert_allclose(record.temperature, run.temperature, atol=1e-8)
         assert record.sample_rate_hz == pytest.approx(0.1, rel=1e-9)
-    assert read(table, Columns(time="hours", time_unit="h")).drift is None
+    assert read_thermal(table, Columns(time="hours", time_unit="h")).drift is None
 
 
 def test_applying_writes_what_the_model_says(cycles, model, tmp_path):
@@ -104,7 +104,7 @@ def test_applying_writes_what_the_model_says(cycles, model, tmp_path):
     result = CliRunner().invoke(app, ["compensate", "apply", str(model), str(cycles / "unseen"), "--out", str(out)])
     assert result.exit_code == 0, result.output
     written = np.genfromtxt(out, delimiter=",", names=True)
-    expected = read_model(model).apply(read(cycles / "unseen", Columns()).record)
+    expected = read_model(model).apply(read_thermal(cycles / "unseen", Columns()).record)
     np.testing.assert_allclose(written["rate_deg_h"], expected.rate / DEG_H, rtol=1e-8)
     np.testing.assert_allclose(written["drift_deg_h"], expected.drift / DEG_H, rtol=1e-8)
     np.testing.assert_array_equal(written["extrapolated"], expected.extrapolated)
@@ -273,7 +273,7 @@ def test_a_run_without_a_thermometer_is_refused(tmp_path):
     scene.write_text("name: still\nduration: 1 s\nmotion: [static: {}]\nsensors: {mems_gyro: {preset: adis16505}}\n")
     testbed.run(testbed.load_scenario(scene), out=tmp_path / "run")
     with pytest.raises(ScenarioError, match="expected one sensor with a thermometer, got none"):
-        read(tmp_path / "run", Columns())
+        read_thermal(tmp_path / "run", Columns())
 
 
 @pytest.mark.parametrize(("command", "what"), [("train", "a file"), ("apply", "a file"), ("audit", "a folder")])

@@ -203,7 +203,7 @@ def test_a_refused_fit_prints_no_coefficient(tmp_path):
 @pytest.mark.parametrize(
     ("rate", "message"),
     [
-        (np.ones(1000), "no deviation at all at 0.01 s"),
+        (np.ones(1000), "all readings are 57.2958 deg/s: rounded to words above"),
         (np.array([1.0, 2.0]), "at least 4 samples"),
         (np.array([1.0, 2.0, 1.0, 3.0, 2.0, 5.0, 1.0, 0.0]), "expected at least 5 averaging times, got 2"),
         (np.array([1.0, np.inf, 1.0, 3.0]), "got inf at sample 1"),

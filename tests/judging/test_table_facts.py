@@ -7,12 +7,14 @@ import pytest
 
 import testbed
 from testbed.chain.pipeline import simulate
-from testbed.cli.terminal import print_metrics, print_scenario
+from testbed.cli.terminal import print_metrics
+from testbed.cli.understood import print_scenario
 from testbed.judging.judge import Judge
 from testbed.judging.table_facts import TableMetrics, table_facts, truth_noise
 from testbed.models.motion import CommandBlock
 from testbed.models.turntable.modes import coupled_modes
-from testbed.models.turntable.turntable import Turntable, TurntableParameters
+from testbed.models.turntable.parameters import TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.scenario.model import BASE_RATE_HZ
 from testbed.scenario.step_choice import excerpt
 from tests.scenes import short

@@ -66,6 +66,15 @@ def test_the_figures_are_those_of_the_report(run):
     assert [axes.get_title(loc="left")[:6] for axes in figures["errors"].axes] == ["kalman", "arw_sh"]
 
 
+def test_a_notebook_shows_the_figures_and_two_cells_do_not_mix(pair):
+    figures, others = pair[0].plot(), pair[1].plot()
+    page, other = figures._repr_html_(), others._repr_html_()
+    assert page.count("<svg") == len(figures) == 4
+    ids, more = (set(re.findall(r'\bid="([^"]+)"', text)) for text in (page, other))
+    assert ids
+    assert not ids & more
+
+
 def test_the_tree_has_units_names_and_the_signals(run):
     tree = run.to_xarray()
     assert isinstance(tree, xr.DataTree)

@@ -12,6 +12,7 @@ import h5netcdf
 import numpy as np
 import pytest
 
+import testbed
 from testbed.errors import ScenarioError
 from testbed.pages.numbers import fixed, significant
 from testbed.report import write_report
@@ -228,6 +229,30 @@ def test_report_without_lines_floor_filters_or_spectrum(tmp_path: Path):
     metrics["fusion"] = {}
     page = write_report(make_run(tmp_path / "none", metrics)).read_text(encoding="utf-8")
     assert len(re.findall("<svg", page)) == 2
+
+
+@pytest.mark.parametrize("sensors", [{}, {"mems_gyro": {"preset": "adis16505", "dropped": "100 %"}}])
+def test_report_of_a_table_alone_and_of_a_sensor_without_a_reading(tmp_path: Path, sensors: dict[str, Any]):
+    still = {"name": "table", "duration": "0.1 s", "motion": [{"constant": {"rate": "1 deg/s"}}], "sensors": sensors}
+    run = testbed.run(still, out=tmp_path / "run")
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert ("spectrum" in run.plot()) == bool(sensors)
+    assert len(re.findall("<svg", page)) == len(run.plot())
+
+
+def test_a_run_of_one_sample_has_its_report_too(tmp_path: Path):
+    sensors = {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}}
+    brief = {
+        "name": "brief",
+        "duration": "50 us",
+        "motion": [{"static": {}}],
+        "sensors": sensors,
+        "fusion": {"kalman": {}},
+    }
+    run = testbed.run(brief, out=tmp_path / "run")
+    assert run.sensors["mems_gyro"].rate.shape == (1,)
+    assert run.sensors["mems_gyro"].sample_rate_hz == 2000.0
+    assert "spectrum" in run.plot()
 
 
 def test_report_optimum_column_only_when_known(tmp_path: Path, page: str):

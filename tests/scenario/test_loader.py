@@ -37,10 +37,10 @@ expect:
 """
 
 
-def load(tmp_path, text=GOOD):
+def load(tmp_path, text=GOOD, **options):
     path = tmp_path / "scenario.yaml"
     path.write_text(text, encoding="utf-8")
-    return load_scenario(path)
+    return load_scenario(path, **options)
 
 
 def refused(tmp_path, old, new):
@@ -189,6 +189,14 @@ def test_load_of_the_resolved_scenario_gives_the_same_run(tmp_path):
             "fusion.kalman.type",
             "unknown filter 'nowhere:Nothing'",
         ),
+        ("{q: 0.1 (deg/s)^2/s}", "{belief: [1]}", 13, "fusion.kalman.belief", "expected the name of a belief"),
+        ("{q: 0.1 (deg/s)^2/s}", "{belief: 1}", 13, "fusion.kalman.belief", "expected the name of a belief"),
+        ("{q: 0.1 (deg/s)^2/s}", "{belief: {mhd_ars: 1}}", 13, "fusion.kalman.belief.mhd_ars", "got 1"),
+        ("{q: 0.1 (deg/s)^2/s}", "{type: 5}", 13, "fusion.kalman.type", "expected a name, got 5"),
+        ("{q: 0.1 (deg/s)^2/s}", "{type: [kalman]}", 13, "fusion.kalman.type", "expected a name"),
+        ("preset: sx300", "preset: sx300, type: 5", 10, "sensors.mhd_ars.type", "expected a name, got 5"),
+        ("seed: 7", f"seed: {2**63}", 2, "seed", "less than or equal to 9223372036854775807"),
+        ("seed: 7", f"bandwidth: {'9' * 400} Hz", 2, "bandwidth", "got a text of 403 characters"),
         ('"< 0.0143"', "0.0143", 15, "expect.kalman.rmse_deg_s", "such as '< 0.0143'"),
         ('"< 0.0143"', '"< zero"', 15, "expect.kalman.rmse_deg_s", "such as '< 0.0143'"),
         ("rmse_deg_s:", "rms_deg_s:", 15, "expect.kalman.rms_deg_s", "is no metric"),
@@ -284,14 +292,66 @@ def test_load_finds_a_recorded_motion_beside_the_scenario_and_its_bad_line(tmp_p
 
 
 def test_load_takes_a_users_own_filter_by_its_path(tmp_path, monkeypatch):
-    (tmp_path / "own_filter.py").write_text(
+    (tmp_path / "users_filter.py").write_text(
         "class Mine:\n    def __init__(self, belief, sample_rate_hz, parameters):\n        self.parameters = "
         "parameters\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    scenario = load(tmp_path, GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: own_filter:Mine, gain: 3}"))
+    text = GOOD.replace("kalman: {q: 0.1 (deg/s)^2/s}", "kalman: {type: users_filter:Mine, gain: 3}")
+    scenario = load(tmp_path, text, plugins=["users_filter"])
     assert scenario.fusion["kalman"].parameters == {"gain": 3}
     assert scenario.fusion["kalman"].factory.__name__ == "Mine"
+
+
+@pytest.mark.parametrize(
+    "file", ["../record.csv", "/etc/hostname", "sub/../../record.csv", "away/record.csv", "~/x", "a\0b", "x" * 5000]
+)
+def test_load_reads_a_recorded_motion_only_inside_the_scenarios_folder(tmp_path, file):
+    """Also through a link; what stands there is not read and not repeated."""
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (tmp_path / "record.csv").write_text("secret,column\n1,2\n")
+    (inside / "away").symlink_to(tmp_path)
+    entry = f"- recorded: {{file: {file!r}, time: {{column: t, unit: s}}, rate: {{column: w, unit: deg/s}}}}"
+    text = GOOD.replace("- sine: {frequency: 0.5 Hz, angle: 5.555 mrad}", entry)
+    with pytest.raises(ScenarioError) as caught:
+        load(inside, text)
+    assert "secret" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_load_reads_outside_the_folder_when_told_to(tmp_path):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (tmp_path / "record.csv").write_text("t,w\n" + "\n".join(f"{0.01 * i:.2f},0.1" for i in range(300)))
+    entry = "- recorded: {file: ../record.csv, time: {column: t, unit: s}, rate: {column: w, unit: deg/s}}"
+    text = GOOD.replace("- sine: {frequency: 0.5 Hz, angle: 5.555 mrad}", entry)
+    with pytest.raises(ScenarioError, match=r"in the scenario's folder; --allow-outside"):
+        load(inside, text)
+    assert load(inside, text, allow_outside=True).motion[0][0] == "recorded"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("secret,w\n1,2\n", "no column 't'"),
+        ("t,w\n0,1\nsecret key,2\n", "got 'secret key'"),
+        ("t,w\n0,1\n0.01,inf\n", "finite number"),
+        ("secret\n\nt,w\n0,1\n0.01\nx,y,z\n", "record.csv"),
+        ("t,w\n" + "0," + "9" * 200_000 + "\n", "finite number"),
+        ("", "column of numbers"),
+        ("t,w\n0,1\n", "at least 4 samples"),
+        ("t,w\n" + "1" * 100 + "x,1\n", "got '1111"),
+    ],
+)
+def test_a_bad_record_is_refused_and_nothing_but_the_cell_is_repeated(tmp_path, content, message):
+    (tmp_path / "record.csv").write_text(content)
+    entry = "- recorded: {file: record.csv, time: {column: t, unit: s}, rate: {column: w, unit: deg/s}}"
+    with pytest.raises(ScenarioError) as caught:
+        load(tmp_path, GOOD.replace("- sine: {frequency: 0.5 Hz, angle: 5.555 mrad}", entry))
+    assert message in str(caught.value)
+    assert ("secret" in str(caught.value)) == ("secret key" in message)
+    assert len(str(caught.value)) < 500
 
 
 def test_load_takes_two_gyros(tmp_path):

@@ -39,6 +39,8 @@ def test_unknown_preset_gives_the_nearest() -> None:
 @pytest.mark.parametrize("freq", [1.0, 10.0, 100.0, 900.0])
 def test_noise_off_equals_the_response(name: str, freq: float) -> None:
     sensor = load_preset(name).model_copy(update={"noise": False})
+    if (2.0 * freq / sensor.sample_rate).is_integer():
+        pytest.skip("half the sample rate, where a sine has no phase")
     settle, periods = 4.0, max(round(freq), 1)
     t = np.arange(round(20000.0 * (settle + periods / freq))) / 20000.0
     # A sine begins at its mean, with which the sensor is in equilibrium.

@@ -263,8 +263,8 @@ def test_every_random_term_has_a_stream_of_its_own(monkeypatch: pytest.MonkeyPat
         monkeypatch.setattr(module, "random_stream", recorded)
     terms = {**TERMS, **ALL}
     noisy(**terms).start(FS, 7, "left")
-    # Every term but the ramp, the three of the clock and the switch, and what was before the record.
-    assert len(drawn) == len(TERMS) - 1 + 4
+    # Every term but the ramp, and the three of the clock and the switch.
+    assert len(drawn) == len(TERMS) - 1 + 3
     assert len(set(drawn)) == len(drawn)
     assert {key[:2] for key in drawn} == {(7, "left")}
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from testbed.cli.options import Output, expanded
+from testbed.cli.options import Output, PluginModules, expanded
 
 
 @expanded
-def list_parts(output: Output) -> None:
+def list_parts(output: Output, plugin: PluginModules = None) -> None:
     """List motions, sensors, filters, presets, beliefs, bands, drift models and papers."""
-    from testbed.cli.catalogue import catalogue
-    from testbed.cli.terminal import print_catalogue
+    from testbed.cli.catalogue import catalogue, print_catalogue
 
-    found = catalogue()
+    found = catalogue(plugin or ())
     output.show(found, lambda: print_catalogue(found))

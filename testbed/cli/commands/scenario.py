@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from testbed.cli.options import Output, ScenarioFile, expanded
+from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, expanded
 from testbed.cli.status import MISSED
 
 
@@ -17,20 +17,24 @@ def run(
     scenario: ScenarioFile,
     output: Output,
     out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/<scenario name>.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Instead of the scenario's seed.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Instead of the scenario's seed.")] = None,
     block: Annotated[
         str | None, typer.Option(metavar="TIME", help="Length of a block; the result does not depend on it.")
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
+    plugin: PluginModules = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Run a scenario, print its errors and write the run folder."""
     from testbed.chain.runner import run as run_scenario
     from testbed.cli.terminal import print_metrics
+    from testbed.cli.understood import doubts
     from testbed.logs.options import quantity
     from testbed.scenario.loader import load_scenario
 
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+    output.warn(doubts(loaded))
     target = out or Path("runs") / loaded.name
     with output.progress(loaded.name, loaded.frame.duration) as tick:
         result = run_scenario(loaded, out=target, seed=seed, block=length, progress=tick)
@@ -45,14 +49,16 @@ def run(
 
 
 @expanded
-def check(scenario: ScenarioFile, output: Output) -> None:
+def check(
+    scenario: ScenarioFile, output: Output, plugin: PluginModules = None, allow_outside: AllowOutside = False
+) -> None:
     """Validate a scenario and print what was understood."""
-    from testbed.cli.terminal import print_scenario
-    from testbed.cli.understood import scenario_document
+    from testbed.cli.understood import doubts, print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+    output.warn(doubts(loaded))
     facts = table_facts(loaded)
     output.show(scenario_document(loaded, facts), lambda: print_scenario(loaded, facts))
 

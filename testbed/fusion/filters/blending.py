@@ -77,8 +77,8 @@ class Blending(TwoPaths):
         zeros = zeros_at_dc(fast)
         if zeros > 1:
             msg = (
-                f"belief: expected at most one zero at s = 0 for the fast sensor, got {zeros}; `complementary` "
-                f"takes more"
+                f"belief: expected at most one zero at s = 0 for the fast sensor, got {zeros}; "
+                "`complementary` takes more"
             )
             raise ValueError(msg)
         a, b = inverse(fast)

@@ -133,3 +133,9 @@ class Shakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ShakfParameters
+    blames_the_other = "R of the gyro takes what a railed MHD sensor did for noise, and falls back slowly"
+    # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to
+    # 25 times too small.
+    dishonest = (
+        "R follows the lag, P follows R through a gain that no longer fits: the paper's failure, kept to show it"
+    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from testbed.fusion.analysis.optimum import optimum
-from testbed.fusion.base import BlockFilter, CommonParameters, Rows
+from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
 from testbed.fusion.kernels.covariance import COUNTS, EVERY, settling_kernel
 from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import initial_state
@@ -40,7 +40,7 @@ class SteadyStateParameters(CommonParameters):
 
     frequency: Frequency = 10.0
     amplitude: Range = math.radians(1.0)
-    coloured: bool = False
+    coloured: Switch = False
 
 
 class SteadyState(BlockFilter):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from testbed.fusion.base import BlockFilter, Rows
+from testbed.fusion.base import BlockFilter, CommonParameters, Rows
 from testbed.fusion.kernels.covariance import GATE, PATIENCE
 from testbed.fusion.model import build_model
 from testbed.fusion.two_paths.design import (
@@ -19,10 +19,10 @@ from testbed.fusion.two_paths.design import (
     best_crossover,
     input_psd,
     low_pass,
+    without_far_zeros,
 )
 from testbed.fusion.two_paths.kernel import MEMORY_ROWS, two_paths
 from testbed.fusion.two_paths.noise import noise_variance
-from testbed.parts import Part
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
@@ -30,10 +30,11 @@ if TYPE_CHECKING:
 
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
+    from testbed.parts import Part
     from testbed.signals import FloatArray
 
 
-class TwoPathParameters(Part):
+class TwoPathParameters(CommonParameters):
     """What a filter of two paths is made for; None is derived from the belief's noise.
 
     Parameters
@@ -78,6 +79,7 @@ class TwoPaths(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
+    needs_both = True
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters
@@ -86,7 +88,8 @@ class TwoPaths(BlockFilter):
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
-        slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
+        clock = 2.0 * math.pi * self.model.sample_rate_hz
+        slow, fast = (without_far_zeros(belief[self.model.sensors[i]], clock) for i in (self._slow, self._fast))
         order = self.order(fast)
         self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
         power = parameters.amplitude**2 / 2.0
@@ -145,9 +148,6 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     """Return the places of the sensor that is better at low frequency and of the other, which must be read at every
     step.
     """
-    if len(model.sensors) != 2:
-        msg = f"belief: expected two sensors to divide the band between, got {list(model.sensors)}"
-        raise ValueError(msg)
     ends = np.array([input_psd(belief[name])(np.array([LOW_HZ, HIGH_HZ])) for name in model.sensors])
     slow = int(np.argmin(ends[:, 0]))
     fast = 1 - slow

@@ -172,7 +172,8 @@ def inverse(sensor: SensorBelief) -> tuple[FloatArray, FloatArray]:
     """
     b = np.trim_zeros(_numerator(sensor), "b")
     if np.any(np.roots(b).real >= 0.0):
-        msg = f"belief: expected a sensor whose inverse is stable, got the zeros {np.roots(b).tolist()} rad/s"
+        zeros = np.round(np.roots(b), 1).tolist()
+        msg = f"belief: expected a sensor whose inverse is stable, got zeros at {zeros} rad/s; `kalman` takes any"
         raise ValueError(msg)
     return np.array(sensor.denominator), b
 
@@ -186,6 +187,25 @@ def realised(numerator: FloatArray, denominator: FloatArray) -> Realisation:
         Coefficients in s, highest power first.
     """
     return SensorBelief(numerator=tuple(numerator), denominator=tuple(denominator)).realisation()
+
+
+def without_far_zeros(sensor: SensorBelief, reach: float) -> SensorBelief:
+    """Return a belief without its zeros beyond `reach`: constants up to there, but their inverse would be a jump.
+
+    Parameters
+    ----------
+    sensor : SensorBelief
+        Its belief.
+    reach : float
+        [rad/s].
+    """
+    b = _numerator(sensor)
+    zeros = np.roots(b)
+    far = np.abs(zeros) > reach
+    if not far.any():
+        return sensor
+    near = b[0] * np.prod(-zeros[far]) * np.poly(zeros[~far])
+    return sensor.model_copy(update={"numerator": tuple(np.real(near).tolist())})
 
 
 def zeros_at_dc(sensor: SensorBelief) -> int:

@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from testbed.models.mhd_channel.chebyshev import chebyshev_points
-from testbed.models.mhd_channel.fluids import FLUIDS, Fluid, NamedFluid
+from testbed.models.mhd_channel.fluids import NamedFluid
 from testbed.models.mhd_channel.modes import ChannelModes, ChannelStage, channel_modes
 from testbed.models.mhd_channel.thermal_drift import drift
 from testbed.parts import Part
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from pydantic import ValidationInfo
 
     from testbed.signals import ComplexArray, FloatArray
-
-__all__ = ["FLUIDS", "ChannelStage", "Fluid", "MhdChannel", "one_mode_response"]
 
 MIN_NODES = 8
 # Rounding grows as nodes^4 (about 1e-12 of the response at 512), and nothing measured needs more.

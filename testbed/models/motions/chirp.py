@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -39,6 +39,8 @@ class Chirp(Motion):
     ValueError
         If both frequencies are equal.
     """
+
+    example: ClassVar[dict[str, Any]] = {"start_frequency": "1 Hz", "stop_frequency": "20 Hz", "rate": "1 deg/s"}
 
     start_frequency: Frequency
     stop_frequency: Frequency

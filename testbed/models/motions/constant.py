@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ class Constant(Motion):
     rate : float
         Rate [rad/s].
     """
+
+    example: ClassVar[dict[str, Any]] = {"rate": "1 deg/s"}
 
     rate: Rate
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -39,6 +39,8 @@ class Multisine(Motion):
     ValueError
         If neither or both amplitudes are given or a frequency is repeated.
     """
+
+    example: ClassVar[dict[str, Any]] = {"frequencies": ["1 Hz", "3 Hz"], "rate": "1 deg/s"}
 
     frequencies: Annotated[tuple[Frequency, ...], Field(min_length=1)]
     rate: Rate | None = None

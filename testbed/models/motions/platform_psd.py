@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.turntable.realisation import gaussian_rate
+from testbed.models.turntable.realisation import SPLINE_COST, gaussian_rate
 from testbed.parts import Part
 from testbed.units import Frequency, Quantity
 
@@ -62,6 +62,8 @@ class PlatformPsd(Motion):
         If neither or both spectra are given, frequencies do not rise or the edges do not fit.
     """
 
+    example: ClassVar[dict[str, Any]] = {"spectrum": "olympus", "low": "10 Hz", "high": "50 Hz"}
+
     points: Annotated[tuple[SpectrumPoint, ...], Field(min_length=2)] | None = None
     spectrum: Literal["olympus"] | None = None
     low: Frequency | None = None
@@ -105,6 +107,10 @@ class PlatformPsd(Motion):
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         return gaussian_rate(self.density, self._band(), duration, rng)
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the spline."""
+        return SPLINE_COST
 
     def top_frequency(self) -> float:
         """Return the upper edge of the band [Hz]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -98,6 +98,15 @@ class ReactionWheel(Motion):
     .. [1] R. Masterson, D. Miller, R. Grogan (2002), J. Sound Vib. 249:575, doi 10.1006/jsvi.2001.3868.
     """
 
+    example: ClassVar[dict[str, Any]] = {
+        "speed": "600 rev/min",
+        "harmonics": [{"number": 1, "coefficient": "13.7 g*cm^2"}, {"number": 5.2, "coefficient": "2 g*cm^2"}],
+        "inertia": "25 kg*m^2",
+        "modes": [{"frequency": "50 Hz", "damping": 0.01, "gain": 0.5}],
+        "stop_speed": "300 rev/min",
+        "ramp_time": "1.5 s",
+    }
+
     speed: Speed
     harmonics: Annotated[tuple[WheelHarmonic, ...], Field(min_length=1)]
     inertia: Inertia
@@ -165,6 +174,10 @@ class ReactionWheel(Motion):
         if self.stop_speed is not None:
             return ()
         return tuple(harmonic.number * self.speed / (2.0 * np.pi) for harmonic in self.harmonics)
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the harmonics, each through all modes in a ramp."""
+        return len(self.harmonics) * (1 if self.stop_speed is None else 4 + 4 * len(self.modes))
 
     def top_frequency(self) -> float:
         """Return the highest harmonic at the highest speed [Hz]."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import re
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
@@ -12,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from testbed import units
 from testbed.errors import Problem, ScenarioError
+from testbed.inputs.files import read_bytes
 from testbed.logs.clock import NANO
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap
@@ -19,6 +22,7 @@ from testbed.logs.options import refusal
 from testbed.logs.plan import plan
 from testbed.logs.reader import read_plans
 from testbed.models.motion import Motion, RateFunction
+from testbed.models.turntable.realisation import SPLINE_COST
 from testbed.parts import Part
 
 if TYPE_CHECKING:
@@ -29,12 +33,25 @@ if TYPE_CHECKING:
 
 _JITTER = 1e-3
 _BAND_POWER = 1e-6
+_MOST_BYTES = 1 << 25
+_ECHO = re.compile(r"""; the header has|, got ['"]|: ['"]""")
 
 
 def _beside_scenario(path: Path, info: ValidationInfo) -> Path:
-    """Take a relative path from the scenario's folder, not from where the command is typed."""
-    folder = (info.context or {}).get("folder")
-    return (Path(folder) / path).resolve() if folder else path
+    """Take a relative path from the scenario's folder, not from where the command is typed, and stay in there."""
+    context = info.context or {}
+    if not context.get("folder"):
+        return path
+    folder = Path(context["folder"]).resolve()
+    try:
+        place = (folder / path).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        msg = "expected a path"
+        raise ValueError(msg) from error
+    if not place.is_relative_to(folder) and not context.get("allow_outside"):
+        msg = "expected a file in the scenario's folder; --allow-outside (allow_outside=True) lets it read others"
+        raise ValueError(msg)
+    return place
 
 
 class Column(Part):
@@ -71,8 +88,15 @@ class Recorded(Motion):
     Raises
     ------
     ScenarioError
-        If the file cannot be read, a value is missing or not finite, or the samples are uneven.
+        If the file cannot be read or is larger than 32 MiB, a value is missing or not finite, or the samples are
+        uneven.
     """
+
+    example: ClassVar[dict[str, Any]] = {
+        "file": "record.csv",
+        "time": {"column": "t", "unit": "s"},
+        "rate": {"column": "w", "unit": "deg/s"},
+    }
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column
@@ -112,6 +136,10 @@ class Recorded(Motion):
 
         return value
 
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the spline."""
+        return SPLINE_COST
+
     def top_frequency(self) -> float:
         """Return the frequency [Hz] above which less than 1e-6 of the power of the rate lies."""
         t, rate = self._read()
@@ -124,23 +152,29 @@ class Recorded(Motion):
         self._content()
         time = TimeMap(column=self.time.column, unit=self.time.unit)
         mapped = ChannelMap(column=self.rate.column, unit=self.rate.unit, kind="rate", time=time)
-        channel = read_plans([plan("rate", mapped, open_table(self.file), lambda field: field.partition(".")[0])])[
-            "rate"
-        ]
-        rate = channel.whole()
+        try:
+            table = open_table(self.file)
+            channel = read_plans([plan("rate", mapped, table, lambda field: field.partition(".")[0])])["rate"]
+            rate = channel.whole()
+        except ScenarioError as error:
+            raise ScenarioError([_discreet(problem) for problem in error.problems]) from error
         _refuse_jitter(channel)
         return np.arange(rate.size) / channel.rate_hz, rate
 
     def _content(self) -> bytes:
-        try:
-            content = self.file.read_bytes()
-        except OSError as error:
-            raise refusal(self.file, f"cannot be read: {error}") from error
+        content = read_bytes(self.file, _MOST_BYTES, "a record")
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in {None, found}:
             message = f"expected the file whose SHA-256 is {self.sha256}, got {found}: it has changed since"
             raise refusal(self.file, message)
         return content
+
+
+def _discreet(problem: Problem) -> Problem:
+    """Return a finding without what else stands in the file: a scenario names it, so its reader may not know it."""
+    if problem.line is not None and "fields" not in problem.message:
+        return problem
+    return replace(problem, message=_ECHO.split(problem.message, maxsplit=1)[0])
 
 
 def _refuse_jitter(channel: LogChannel) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -39,6 +39,8 @@ class Sine(Motion):
     ValueError
         If neither or both of `rate` and `angle` are given.
     """
+
+    example: ClassVar[dict[str, Any]] = {"frequency": "10 Hz", "rate": "1 deg/s"}
 
     frequency: Frequency
     rate: Rate | None = None

@@ -150,8 +150,8 @@ class DigitalLoop:
 
     def _saturated(self, k: int) -> None:
         msg = (
-            f"turntable: the motor saturated at its {self._limit:g} N*m at t = {k * self._dt:.6g} s; the run got "
-            f"this far"
+            "turntable: "
+            f"the motor saturated at its {self._limit:g} N*m at t = {k * self._dt:.6g} s; the run got this far"
         )
         raise RunError(msg)
 
@@ -176,8 +176,8 @@ def check_loop(parameters: TurntableParameters, sample_rate_hz: float) -> None:
     stride = sample_rate_hz / rate
     if round(stride) < 1 or abs(stride - round(stride)) > 1e-9 * stride:
         msg = (
-            f"turntable: digital.controller_rate: expected {sample_rate_hz:g} Hz divided by a whole number, got "
-            f"{rate:g} Hz"
+            "turntable: digital.controller_rate: "
+            f"expected {sample_rate_hz:g} Hz divided by a whole number, got {rate:g} Hz"
         )
         raise ScenarioError(msg)
     largest = np.abs(np.linalg.eigvals(closed_loop(parameters))).max()

@@ -122,7 +122,7 @@ def check_floor(parameters: TurntableParameters, sample_rate_hz: float) -> None:
     top = parameters.floor.top_frequency()
     if top >= sample_rate_hz / 2:
         msg = (
-            f"turntable: floor: expected frequencies below {sample_rate_hz / 2:g} Hz, half the base clock, got "
-            f"{top:g} Hz"
+            f"turntable: floor: expected frequencies below {sample_rate_hz / 2:g} Hz, "
+            f"half the base clock, got {top:g} Hz"
         )
         raise ScenarioError(msg)

@@ -15,8 +15,6 @@ from testbed.models.turntable.digital import DigitalLoop, check_loop
 from testbed.models.turntable.disturbances import Disturbances, check_floor
 from testbed.models.turntable.engine import Engine
 from testbed.models.turntable.modal import ModalEngine, check_modal
-from testbed.models.turntable.parameters import Cogging, Mounting, TurntableParameters
-from testbed.models.turntable.servo import required_torque
 from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
@@ -25,11 +23,10 @@ if TYPE_CHECKING:
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.earth import EarthRate
     from testbed.models.turntable.floor import FloorMotion
+    from testbed.models.turntable.parameters import Mounting, TurntableParameters
     from testbed.signals import FloatArray
 
     Poses = dict[str, tuple[FloatArray, FloatArray]]
-
-__all__ = ["Cogging", "Mounting", "TruthBlock", "Turntable", "TurntableParameters", "check_plant", "required_torque"]
 
 
 @dataclass(frozen=True)

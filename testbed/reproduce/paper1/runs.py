@@ -17,7 +17,8 @@ from testbed.fusion import estimate
 from testbed.metrics.errors import ErrorMetrics
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ, random_stream, sample_times
 from testbed.units import DEG
@@ -100,7 +101,7 @@ def fuse(readings: Mapping[str, FloatArray], sensors: Mapping[str, Sensor]) -> d
         Instruments by name, of which the filters learn the sample rates only.
     """
     rates = {name: sensor.sample_rate for name, sensor in sensors.items()}
-    return {name: estimate(name, readings, sample_rate_hz=rates) for name in FILTERS}
+    return {name: estimate(name, readings, sample_rate_hz=rates, start="rest") for name in FILTERS}
 
 
 def outputs(rate: FloatArray, seed: int, sensors: Mapping[str, Sensor]) -> dict[str, FloatArray]:

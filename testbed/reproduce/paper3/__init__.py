@@ -285,7 +285,7 @@ def _printed(
 ) -> Iterator[str]:
     yield (
         f"Table 2 on our data, median over {seeds} seed(s); B in deg/h, N in deg/sqrt(h), none where the noise "
-        f"model does not describe the curve"
+        "model does not describe the curve"
     )
     heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks")
     yield f"{'method':20s}{'trained on':18s}" + "".join(f"{head:>11s}" for head in heads)

@@ -310,6 +310,18 @@ def test_a_loop_wider_than_its_sensor_is_refused() -> None:
         Blending(load_belief("eq39"), RATES, TwoPathParameters(crossover=800.0))
 
 
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_zero_far_beyond_the_clock_is_a_constant(cls: Any) -> None:
+    """A fit may leave one; inverted it would be a jump from one noisy reading to the next."""
+    fast = PLAIN["mhd_ars"]
+    far = fast.model_copy(update={"numerator": tuple(np.polymul(fast.numerator, [1e-8, 1.0]))})
+    plain, same = (cls(PLAIN | {"mhd_ars": one}, RATES, TwoPathParameters()) for one in (fast, far))
+    noise = 1e-5 * np.random.default_rng(3).standard_normal(2000)
+    a, b = (one.process({"mhd_ars": noise, "mems_gyro": noise[::10]}).rate for one in (plain, same))
+    # Up to half the clock the zero changes the sensor by 6e4 / 1e8.
+    np.testing.assert_allclose(a, b, rtol=0.0, atol=2e-3 * np.abs(a).max())
+
+
 def test_two_zeros_at_dc_raise_the_order_of_one_and_are_refused_by_the_other() -> None:
     twice = SensorBelief(
         numerator=(9000.0, 0.0, 0.0), denominator=tuple(np.poly([-9000.0, -15.0, -0.3])), output_noise=1e-7

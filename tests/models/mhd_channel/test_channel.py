@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from testbed.models.mhd_channel import modes as modes_module
-from testbed.models.mhd_channel.channel import Fluid, MhdChannel, one_mode_response
+from testbed.models.mhd_channel.channel import MhdChannel, one_mode_response
 from testbed.models.mhd_channel.chebyshev import clenshaw_curtis, even_operators
-from testbed.models.mhd_channel.fluids import FLUIDS
+from testbed.models.mhd_channel.fluids import FLUIDS, Fluid
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 
 if TYPE_CHECKING:

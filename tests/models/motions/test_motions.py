@@ -193,7 +193,7 @@ def test_recorded_refuses_a_wrong_unit():
 def test_recorded_refuses_a_missing_and_a_binary_file(tmp_path):
     motion = write_record(tmp_path / "r.csv", np.arange(0.0, 3.0, 0.01), np.ones(300))
     (tmp_path / "r.csv").write_bytes(bytes(range(256)))
-    with pytest.raises(ScenarioError, match=r"cannot be read|no column"):
+    with pytest.raises(ScenarioError, match=r"cannot be read"):
         rate_of(motion, 1.0)
     (tmp_path / "r.csv").unlink()
     with pytest.raises(ScenarioError, match="cannot be read"):

@@ -12,8 +12,9 @@ from testbed.errors import RunError, ScenarioError
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import servo
 from testbed.models.turntable.digital import Controller, check_loop, closed_loop
-from testbed.models.turntable.parameters import Digital, Ripple
-from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters, required_torque
+from testbed.models.turntable.parameters import Digital, Mounting, Ripple, TurntableParameters
+from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.turntable import TruthBlock, Turntable
 
 FS = 20000.0
 DT = 1.0 / FS

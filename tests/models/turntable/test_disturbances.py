@@ -14,8 +14,9 @@ from testbed.models.turntable import plant, servo
 from testbed.models.turntable.disturbances import error_motion
 from testbed.models.turntable.engine import Engine
 from testbed.models.turntable.floor import AXES, Floor, FloorBand, FloorLine
-from testbed.models.turntable.parameters import Wobble
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters, required_torque
+from testbed.models.turntable.parameters import Mounting, TurntableParameters, Wobble
+from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.turntable import Turntable
 from testbed.signals import random_stream
 
 FS = 20000.0

@@ -7,7 +7,8 @@ import pytest
 
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable.earth import SPEED, EarthRate
-from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import TruthBlock, Turntable
 
 FS = 20000.0
 LATITUDE, AZIMUTH = np.deg2rad(48.0), np.deg2rad(30.0)

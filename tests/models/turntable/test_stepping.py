@@ -10,7 +10,8 @@ import pytest
 from testbed.errors import ScenarioError
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable import stepping
-from testbed.models.turntable.turntable import Mounting, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import Turntable
 
 FS = 20000.0
 DEG = np.pi / 180.0

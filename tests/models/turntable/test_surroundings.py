@@ -10,7 +10,8 @@ import pytest
 from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
 from testbed.models.turntable.earth import EarthRate
-from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters
+from testbed.models.turntable.parameters import Mounting, TurntableParameters
+from testbed.models.turntable.turntable import TruthBlock, Turntable
 from testbed.signals import random_stream
 
 FS = 20_000.0

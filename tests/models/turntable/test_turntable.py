@@ -14,8 +14,9 @@ from testbed.errors import RunError, ScenarioError
 from testbed.models.motion import CommandBlock, MotionProfile
 from testbed.models.turntable import plant, servo
 from testbed.models.turntable.earth import EarthRate
-from testbed.models.turntable.parameters import Digital, Wobble
-from testbed.models.turntable.turntable import Mounting, TruthBlock, Turntable, TurntableParameters, required_torque
+from testbed.models.turntable.parameters import Digital, Mounting, TurntableParameters, Wobble
+from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.turntable import TruthBlock, Turntable
 from testbed.parts import preset
 
 FS = 20000.0

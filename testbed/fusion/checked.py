@@ -1,0 +1,126 @@
+"""A filter under watch: it gets read-only readings, and what it gives is checked before anybody sees it."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from testbed.errors import RunError, quoted
+from testbed.fusion.base import EstimateBlock
+from testbed.inputs.plugins import PluginError, running
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from testbed.signals import FloatArray
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+# What stands beside the diagnostics of a filter in a run.
+_TAKEN = {"rate", "std", "time"}
+
+
+class CheckedFilter:
+    """A filter whose blocks are checked: shape for all, and for a plug-in everything else that others rely on.
+
+    Parameters
+    ----------
+    name : str
+        Of the filter, for messages.
+    inner : object
+        With ``process(readings)``.
+    sample_rate_hz : float
+        Of the fastest sensor [Hz].
+    shipped : bool
+        Whether it is one of ours: those may show how they fail, by a NaN or a zero.
+    """
+
+    def __init__(self, name: str, inner: Any, sample_rate_hz: float, *, shipped: bool) -> None:
+        self._name, self._inner, self._rate_hz, self._shipped = name, inner, sample_rate_hz, shipped
+        self._block, self._sample = 0, 0
+        self._diagnostics: tuple[str, ...] | None = None
+
+    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
+        """Return the estimate of the next block.
+
+        Parameters
+        ----------
+        readings : mapping of str to array_like, shape (n_sensor_samples,)
+            Readings that fall due [rad/s]; the filter gets views that it cannot change.
+
+        Raises
+        ------
+        RunError
+            If it raises anything or gives what is no estimate: filter, block and fault.
+        """
+        self._block += 1
+        views = {name: _read_only(values) for name, values in readings.items()}
+        n_time = max(values.size for values in views.values())
+        estimate = self._inner.process(views) if self._shipped else self._foreign(views)
+        self._check_shapes(estimate, n_time)
+        checked = estimate if self._shipped else self._checked(estimate)
+        self._sample += n_time
+        return checked
+
+    def _foreign(self, readings: Mapping[str, FloatArray]) -> EstimateBlock:
+        try:
+            with running("raised"):
+                estimate = self._inner.process(readings)
+        except PluginError as error:
+            self._refuse(str(error), error)
+        if not isinstance(estimate, EstimateBlock):
+            self._refuse(f"expected an EstimateBlock, got {quoted(estimate)}")
+        self._check_names(estimate.diagnostics)
+        return estimate
+
+    def _check_names(self, diagnostics: Any) -> None:
+        good = isinstance(diagnostics, dict) and all(
+            isinstance(key, str) and _NAME.fullmatch(key) and key not in _TAKEN for key in diagnostics
+        )
+        if not good:
+            self._refuse(
+                "expected diagnostics by names of letters, digits and underscores other than rate, std and time, "
+                f"got {quoted(diagnostics)}"
+            )
+        names = tuple(sorted(diagnostics))
+        if self._diagnostics is not None and names != self._diagnostics:
+            self._refuse(f"expected the diagnostics of the first block, {self._diagnostics}, got {quoted(names)}")
+        self._diagnostics = names
+
+    def _check_shapes(self, estimate: EstimateBlock, n_time: int) -> None:
+        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
+            if np.shape(values) != (n_time,):
+                self._refuse(f"expected {signal} of shape ({n_time},), got {np.shape(values)}")
+
+    def _checked(self, estimate: EstimateBlock) -> EstimateBlock:
+        rate, std = self._real("rate", estimate.rate), self._real("std", estimate.std)
+        for signal, values, good, what in (
+            ("rate", rate, np.isfinite(rate), "finite values"),
+            ("std", std, (std > 0.0) & np.isfinite(std), "finite values above zero"),
+        ):
+            if not good.all():
+                first = int(np.argmin(good))
+                self._refuse(f"expected {what} of {signal}, got {values[first]!s} at sample {first} of the block")
+        diagnostics = {name: self._real(name, values) for name, values in estimate.diagnostics.items()}
+        return EstimateBlock(rate, std, diagnostics)
+
+    def _real(self, signal: str, values: Any) -> FloatArray:
+        """Return a copy, since a plug-in may go on changing what it gave."""
+        kind = np.asarray(values).dtype
+        if kind.kind != "f":
+            self._refuse(f"expected {signal} of floating-point numbers, got {kind}")
+        return np.array(values, dtype=np.float64)
+
+    def _refuse(self, what: str, cause: Exception | None = None) -> NoReturn:
+        at = self._sample / self._rate_hz
+        msg = f"filter {self._name}, block {self._block} (from t = {at:g} s): {what}"
+        raise RunError(msg) from cause
+
+
+def _read_only(values: ArrayLike) -> FloatArray:
+    view: FloatArray = np.asarray(values).view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,87 @@
+"""Every filter takes every belief that ships, or refuses it by name when it is built, which `check` does."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from testbed.fusion.belief import load_belief
+from testbed.parts import preset, preset_names
+from testbed.scenario.beliefs import belief_of
+from testbed.sensors import load_preset
+from tests.contract.records import BELIEF, DEG, METHODS, NAMES, RATES, readings_of, sines
+
+PRESETS = {name: preset("testbed.sensors", name)["type"] for name in preset_names("testbed.sensors")}
+FAST = [name for name, kind in PRESETS.items() if kind == "mhd_ars"]
+# What sees a constant rate: a sensor that sees only a band, as an MHD ARS does, is no partner for one.
+SLOW = [name for name in PRESETS if abs(load_preset(name).response(np.array([1e-6]))[0]) > 0.5]
+# Shipped beliefs whole, each data sheet's gyro beside equation (39)'s MHD ARS, and all pairs of instruments exactly.
+CASES = [
+    *("eq39", "identified", "swept", "paper2"),
+    *(f"eq39 and {slow}" for slow in SLOW if "belief" in preset("testbed.sensors", slow)),
+    *(f"exactly {fast} and {slow}" for fast in FAST for slow in SLOW),
+]
+
+pytestmark = pytest.mark.contract
+
+
+@functools.cache
+def case(name):
+    """Return the belief and the sample rates that a case means."""
+    if name.startswith("exactly "):
+        fast, slow = name.removeprefix("exactly ").split(" and ")
+        rates = RATES | {"mems_gyro": load_preset(slow).sample_rate}
+        return {"mems_gyro": belief_of(slow, exact=True), "mhd_ars": belief_of(fast, exact=True)}, rates
+    if " and " in name:
+        return BELIEF | {"mems_gyro": belief_of(name.split(" and ")[1])}, RATES
+    return load_belief(name), RATES
+
+
+def refusal(name, case_name):
+    """Return why a filter does not take a belief, empty if it does."""
+    belief, rates = case(case_name)
+    try:
+        METHODS[name](belief, rates, METHODS[name].Parameters())
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("case_name", CASES)
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_built_or_says_what_it_expects(name, case_name):
+    message = refusal(name, case_name)
+    assert not message or message.startswith("belief: expected")
+
+
+def test_hardly_anything_is_refused():
+    """Who refuses everything would pass above: all but an inverse of the fibre-optic gyro's mean over 2.5 ms works."""
+    refused = {(name, case_name.split()[-1]) for name in NAMES for case_name in CASES if refusal(name, case_name)}
+    assert refused == {("complementary", "fog_paper3")}
+
+
+@pytest.mark.parametrize("case_name", CASES)
+@pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].needs_both])
+def test_a_fixed_pair_of_paths_follows_a_sine_with_any_of_them(name, case_name):
+    """What it is designed from differs most from belief to belief: 1 deg/s at 10 Hz is met as claimed."""
+    belief, rates = case(case_name)
+    rate = sines((10.0, 1.0), duration=1.5)
+    if refusal(name, case_name):
+        pytest.skip("refused")
+    stage = METHODS[name](belief, rates, METHODS[name].Parameters())
+    block = stage.process(readings_of(rate, 1, belief, rates))
+    error = (block.rate - rate)[10_000:]
+    assert np.sqrt(np.mean(error**2)) < 0.01 * DEG
+    assert np.mean((error / block.std[10_000:]) ** 2) < 2.0
+
+
+@pytest.mark.parametrize("case_name", ["eq39 and adis16505", "exactly sx300 and adis16505"])
+@pytest.mark.parametrize("name", NAMES)
+def test_it_runs_on_a_wide_gyro(name, case_name):
+    belief, rates = case(case_name)
+    rate = sines((10.0, 1.0), duration=0.5)
+    block = METHODS[name](belief, rates, METHODS[name].Parameters()).process(readings_of(rate, 1, belief, rates))
+    # Worse than no filter at all would be the amplitude.
+    assert np.sqrt(np.mean((block.rate - rate)[5000:] ** 2)) < 1.0 * DEG
