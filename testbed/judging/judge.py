@@ -14,6 +14,7 @@ from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
+from testbed.scenario.departures import departures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,8 +42,9 @@ class Judge:
         self._scenario = scenario
         self._rates = rates
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
-        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
-        self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        span = (scenario.frame.settle, scenario.frame.duration)
+        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True, span=span) for name in scenario.sensors}
+        self._errors |= {name: ErrorMetrics(scenario.lines, span=span) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._table = TableMetrics(scenario, step)
 
@@ -116,6 +118,7 @@ class Judge:
             "budget": budget_summary(psds, frame.bandwidth) if psds else None,
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "setup": departures(self._scenario),
             "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)
