@@ -145,6 +145,21 @@ def test_every_output_declares_the_belief(tmp_path, capsys):
     assert f"belief of arw_shakf: {own}\n" in printed
 
 
+def test_a_belief_as_written_bears_no_name_but_its_own(tmp_path):
+    """The exact belief of another instrument is not exact, and a changed number makes a shipped belief another."""
+    gyro = belief_of("adis16505_filtered")
+    for source, numerator, wanted in (
+        ("eq39", gyro.numerator, "eq39"),
+        ("eq39", (150.0, 15.0), "given"),
+        ("exact", gyro.numerator, "given"),
+        ("nobody", gyro.numerator, "given"),
+    ):
+        written = f"{{numerator: {list(numerator)}, denominator: {list(gyro.denominator)}, source: {source}, "
+        written += f"input_noise: {gyro.input_noise!r} rad/sqrt(s), output_noise: {gyro.output_noise!r} rad/sqrt(s)}}"
+        own = f"kalman: {{belief: {{mems_gyro: {written}, mhd_ars: {written}}}}}"
+        assert short(tmp_path, ("kalman: {}", own)).fusion["kalman"].belief["mems_gyro"].source == wanted
+
+
 def test_a_sensor_entry_has_no_belief_of_its_own(tmp_path):
     with pytest.raises(testbed.ScenarioError, match="belief"):
         short(tmp_path, ("{preset: sx300}", "{preset: sx300, belief: eq39}"))
