@@ -55,7 +55,7 @@ def errors(signal: str, seed: int) -> dict[str, tuple[float, float]]:
     runs["steady_state, for it"] = "steady_state", {"frequency": strongest, "amplitude": amplitude}
     settled, found = round(SETTLE * RATES["mhd_ars"]), {}
     for label, (name, own) in runs.items():
-        block = estimate(name, readings, sample_rate_hz=RATES, belief=BELIEF, **own)
+        block = estimate(name, readings, sample_rate_hz=RATES, belief=BELIEF, start="rest", **own)
         error = (block.rate - rate)[settled:]
         found[label] = tuple(float(np.sqrt(np.mean(values**2))) / DEG for values in (error, block.std[settled:]))
     return found
@@ -65,7 +65,7 @@ def main() -> None:
     """Print what was derived, then errors, claims and ratios, median over the seeds."""
     for name in ("complementary", "blending"):
         factory = resolve("filter", name, FILTERS)
-        built = factory(BELIEF, RATES, factory.Parameters())
+        built = factory(BELIEF, RATES, factory.Parameters(start="rest"))
         print(f"{name}: crossover {1e3 * built.crossover_hz:.2f} mHz, bandwidth {built.bandwidth_hz:.0f} Hz")
     seeds = range(1, 1 + int(sys.argv[1] if len(sys.argv) > 1 else 3))
     print(f"{'':>8}{'':>22}{'RMSE':>10}{'claimed':>10}{'x optimum':>11}   deg/s, median of {len(seeds)} seeds")

@@ -24,7 +24,7 @@ class BlendParameters(Part):
 
 
 class Blend(BlockFilter):
-    r"""Two first-order loops, :math:`\dot\omega = w_1 e_1 + w_2 e_2`, e what a reading has beyond the sensor's model.
+    """Two first-order loops, d rate / dt = w_1 e_1 + w_2 e_2, e what a reading has beyond the sensor's model.
 
     References
     ----------
@@ -38,7 +38,7 @@ class Blend(BlockFilter):
         w, low, fast = 2 * np.pi * parameters.bandwidth, parameters.crossover, self.schedule.strides.index(1)
         seen = abs(belief[self.schedule.sensors[fast]].realisation().response(np.array([low]))[0])
         loops = np.where(np.arange(2) == fast, w, 2 * np.pi * low + w * seen)
-        self._model = model = build_model(belief, sample_rate_hz, order=1, q=w * parameters.lag**2)
+        self._model = model = build_model(belief, sample_rate_hz, order=1, q=w * parameters.lag**2, start="rest")
         self._K = np.outer(loops * model.strides / model.sample_rate_hz, np.eye(len(model.F))[0])
         self._state = np.zeros(len(model.F)), model.P0.copy(), np.zeros(2)
 

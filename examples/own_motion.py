@@ -9,7 +9,9 @@ from testbed.units import Frequency, PositiveDuration, Rate
 
 
 class RingDown(Motion):
-    r"""A decaying sine, :math:`\dot\theta = a\, e^{-t'/\tau} \sin(2\pi f t')`, t' the time since the last knock.
+    r"""A structure that is knocked again and again, and rings down.
+
+    :math:`\dot\theta = a\, e^{-t'/\tau} \sin(2\pi f t')`, t' the time since the last knock.
 
     Parameters
     ----------

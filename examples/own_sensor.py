@@ -8,7 +8,9 @@ from testbed.units import Frequency, Range, RateDensity
 
 
 class BandPass(Sensor):
-    r"""A rate sensor that sees a band: :math:`G(s) = \omega_2 s / (s + \omega_1) / (s + \omega_2)`.
+    r"""A rate sensor that sees a band, with white noise on its readings.
+
+    :math:`G(s) = \omega_2 s / (s + \omega_1) / (s + \omega_2)`
 
     Parameters
     ----------

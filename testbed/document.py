@@ -147,7 +147,8 @@ def _known(model: type[BaseModel], loc: tuple[str | int, ...]) -> Iterable[str]:
         field = getattr(here, "model_fields", {}).get(step)
         if field is not None:
             here = next((c for c in _classes(field.annotation) if issubclass(c, BaseModel)), here)
-    return list(getattr(here, "model_fields", {}))
+    known: list[str] = here.known_keys() if hasattr(here, "known_keys") else list(getattr(here, "model_fields", {}))
+    return known
 
 
 def _classes(annotation: Any) -> list[type]:

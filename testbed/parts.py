@@ -23,6 +23,11 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file."""
+        return list(cls.model_fields)
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy with other values, validated as the constructor does.
 
@@ -114,3 +119,27 @@ def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any
         below = merged.get(key)
         merged[key] = merge(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
     return merged
+
+
+def lay_over(
+    base: Mapping[str, Any], entry: Mapping[str, Any], ways: tuple[tuple[tuple[str, ...], ...], ...]
+) -> dict[str, Any]:
+    """Return the keys of `base` that stay when `entry` is laid over it: what it says in other words goes.
+
+    Parameters
+    ----------
+    base, entry : mapping
+        Of a preset, and of its user.
+    ways : tuple
+        For each quantity, the sets of keys that say it.
+    """
+    gone = {
+        key
+        for quantity in ways
+        for said in quantity
+        if any(k in entry for k in said)
+        for other in quantity
+        if other != said
+        for key in other
+    }
+    return {key: value for key, value in base.items() if key not in gone}

@@ -1,7 +1,10 @@
-"""Sampled signals: exact time bases, named random streams, and linear filters that keep their state between blocks."""
+"""Sampled signals: exact time bases, named random streams, linear filters that keep their state between blocks, and
+white noise through a linear system.
+"""
 
 from __future__ import annotations
 
+import math
 import zlib
 
 import numpy as np
@@ -61,7 +64,7 @@ class LinearFilter:
     .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
 
     State is kept between calls, so any division into blocks gives the same bits. It starts from rest (x = 0, u = 0
-    before the first sample; a first sample other than zero is a step).
+    before the first sample; a first sample other than zero is a step), unless it is told to `settle`.
 
     Parameters
     ----------
@@ -90,6 +93,17 @@ class LinearFilter:
         self._C, self._D = C, D
         self._x, self._previous, self._started = np.zeros(n), 0.0, False
 
+    def settle(self, level: float) -> None:
+        """Start, before the first sample, as if the input had been constant for ever.
+
+        Parameters
+        ----------
+        level : float
+            The constant, any unit.
+        """
+        if self._x.size:
+            self._x[:] = np.linalg.solve(np.eye(self._x.size) - self._Phi, self._Gamma) * level
+
     def process(self, u: FloatArray) -> FloatArray:
         """Filter the next samples.
 
@@ -105,9 +119,9 @@ class LinearFilter:
         """
         y = np.empty(u.size)
         if u.size and not self._started:
-            # A jump at t = 0 leaves the state at rest: only the feed-through passes it at once.
+            # From rest a jump at t = 0 leaves the state as it is: only the feed-through passes it at once.
             self._previous, self._started = float(u[0]), True
-            y[0] = self._D * u[0]
+            y[0] = self._C @ self._x + self._D * u[0]
             self._previous = _advance(
                 self._x, self._Phi, self._Gamma, self._step, self._C, self._D, self._previous, u[1:], y[1:]
             )
@@ -169,3 +183,35 @@ def transfer(
     s = 2j * np.pi * np.asarray(freq_hz, float)
     value: ComplexArray = np.polyval(np.asarray(numerator, float), s) / np.polyval(np.asarray(denominator, float), s)
     return value
+
+
+def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, FloatArray]:
+    r"""Discretise x' = A x + white noise of density Qc over a step T.
+
+    .. math:: F = e^{A T}, \quad Q = \int_0^T e^{A s} Q_c e^{A' s} ds
+
+    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or
+    cancel otherwise.
+
+    Parameters
+    ----------
+    A, Qc : ndarray, shape (n_state, n_state)
+        Dynamics [1/s] and density of the white noise [state^2/s].
+    T : float
+        Step [s].
+
+    Returns
+    -------
+    F, Q : ndarray, shape (n_state, n_state)
+        Transition [-] and covariance [state^2], symmetric.
+    """
+    n = A.shape[0]
+    doublings = max(0, math.ceil(math.log2(max(float(np.linalg.norm(A, 1)) * T, 1e-300))))
+    step = T / 2**doublings
+    power = expm(np.block([[-A, Qc], [np.zeros((n, n)), A.T]]) * step)
+    F: FloatArray = power[n:, n:].T.copy()
+    Q: FloatArray = F @ power[:n, n:]
+    for _ in range(doublings):
+        Q = Q + F @ Q @ F.T
+        F = F @ F
+    return F, 0.5 * (Q + Q.T)

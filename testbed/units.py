@@ -241,11 +241,15 @@ class Quantity:
     def validate(self, value: Any, info: ValidationInfo) -> float:
         """Return the SI float of `value`; raise a pydantic error that says what was expected."""
         try:
-            si = self._read(value, border=bool((info.context or {}).get("border")))
-            self._bound(si, value)
+            return self.read(value, border=bool((info.context or {}).get("border")))
         except ValueError as error:
             kind = "quantity"
             raise PydanticCustomError(kind, "{reason}", {"reason": str(error)}) from error
+
+    def read(self, value: Any, *, border: bool) -> float:
+        """Return the SI float of `value`, a string with a unit at the `border`; ValueError says what was expected."""
+        si = self._read(value, border=border)
+        self._bound(si, value)
         return si
 
     def _read(self, value: Any, *, border: bool) -> float:

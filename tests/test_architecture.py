@@ -8,6 +8,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import statistics
 from pathlib import Path
 
 import pytest
@@ -102,6 +103,15 @@ def test_every_module_has_a_room_and_every_room_a_rule():
     assert folders - FOUNDATION == set(ROOMS) | set(TOP)
     assert {path.stem for path in ROOT.glob("*.py")} == LOOSE - folders
     assert len(LOOSE - folders) <= 8
+
+
+@pytest.mark.contract
+def test_modules_are_small():
+    """About 150 lines, and three times that at the most; a long one becomes a room, or gives a part away."""
+    lines = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in MODULES}
+    assert statistics.median(lines.values()) <= 160
+    # The cache of compiled kernels watches only the file of each kernel: what they call stands beside them.
+    assert {name for name, count in lines.items() if count > 450} == {"fusion/kernels/covariance.py"}
 
 
 @pytest.mark.contract

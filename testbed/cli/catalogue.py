@@ -8,6 +8,9 @@ import re
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from rich.table import Table
+
+from testbed.cli.console import terminal
 from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
 from testbed.inputs.plugins import Plugins, load_plugins, offered
@@ -43,6 +46,20 @@ def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
         "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
         "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }
+
+
+def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
+    """Print what there is to choose from, the summaries wrapped beside the names."""
+    console = terminal()
+    width = max(len(name) for names in table.values() for name in names)
+    for kind, names in table.items():
+        console.print(kind.replace("_", " "), style="bold")
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(width=width + 2, no_wrap=True)
+        grid.add_column()
+        for name, summary in names.items():
+            grid.add_row(f"  {name}", summary)
+        console.print(grid)
 
 
 def _offered(kind: str, registry: Mapping[str, str], loaded: Plugins) -> dict[str, str]:

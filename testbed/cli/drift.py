@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.table import Table
 
+from testbed.cli.console import terminal
 from testbed.drift.summary import LETTERS, audit_summary
 from testbed.pages.numbers import significant
 
@@ -29,9 +29,9 @@ def print_application(found: Mapping[str, Any]) -> None:
 
 
 def _print(line: str, found: Mapping[str, Any]) -> None:
-    console = Console(soft_wrap=True)
-    console.print(line, highlight=False)
-    console.print(f"wrote {found['written']}", highlight=False)
+    console = terminal()
+    console.print(line)
+    console.print(f"wrote {found['written']}", soft_wrap=True)
 
 
 def print_audit(audited: Audited, folder: Path) -> None:
@@ -44,14 +44,17 @@ def print_audit(audited: Audited, folder: Path) -> None:
     folder : Path
         Where its page is.
     """
-    console, figures = Console(soft_wrap=True), audit_summary(audited.audit)
+    console, figures = terminal(), audit_summary(audited.audit)
     table = Table("", "100 s std", "sigma 1 h", *LETTERS, title=f"{audited.thermal.name}: {audited.method}")
     names = {"before": "record", "after": "compensated", "low_passed": "equal low-pass", "oracle": "oracle"}
     for key, label in names.items():
         if figures[key] is not None:
             table.add_row(label, *_row(figures[key]))
     console.print(table)
-    console.print("std and sigma in deg/h, Q in urad, N in deg/sqrt(h), B in deg/h; none where the noise model fails")
+    console.print(
+        "std and sigma in deg/h, Q in urad, N in deg/sqrt(h), B in deg/h; none where the noise model fails",
+        soft_wrap=True,
+    )
     shown = {
         "drift reduction": "drift_reduction",
         "sigma at 1 h over the oracle's": "oracle_ratio_1h",
@@ -67,9 +70,9 @@ def print_audit(audited: Audited, folder: Path) -> None:
     if audited.extrapolated is not None:
         console.print(f"outside the trained range: {audited.extrapolated:.2%} of the samples")
     for leak in figures["leaks"]:
-        console.print(f"LEAK: {leak}", style="red")
+        console.print(f"LEAK: {leak}", style="red", soft_wrap=True)
     console.print("verdict: " + ("no leak found" if figures["passed"] else "a leak; do not believe this result"))
-    console.print(f"wrote {folder / 'audit.html'}")
+    console.print(f"wrote {folder / 'audit.html'}", soft_wrap=True)
 
 
 def _row(quality: dict[str, object]) -> list[str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="Scenario file.")]
 PluginModules = Annotated[
@@ -50,6 +50,11 @@ class Output:
         """Say what is being done."""
         if not self.quiet:
             typer.echo(text, err=True)
+
+    def warn(self, doubts: Iterable[str]) -> None:
+        """Say what may be wrong, even where all else is quiet."""
+        for doubt in doubts:
+            typer.echo(f"warning: {doubt}", err=True)
 
     def say(self, text: str) -> None:
         """Print a line of the result for people; beside a document it is progress."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table as Grid
 
-from testbed.cli.terminal import _console
+from testbed.cli.console import terminal
 from testbed.logs.inspection import report_data
 from testbed.logs.proposal import map_data
 from testbed.units import DEG
@@ -42,8 +42,8 @@ def document(table: Table, reports: Sequence[Report], proposed: Proposal) -> dic
 
 def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -> None:
     """Print what a recording holds, a row for each channel, then what is wrong and what is open."""
-    out = _console()
-    out.print(f"{table.path}: {table.format}", soft_wrap=True, highlight=False, markup=False)
+    out = terminal()
+    out.print(f"{table.path}: {table.format}", soft_wrap=True)
     grid = Grid("channel", "unit", "samples", "mean", "std", "lowest", "highest", "word", "outline")
     for report in reports:
         values = report.values
@@ -53,12 +53,12 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
         grid.add_row(report.plan.name, unit, str(values.n_time), *(f"{n:.4g}" for n in numbers), word, outline(values))
     out.print(grid)
     for name, clock in _clocks(reports).items():
-        out.print(f"time {name}: {_time(clock)}", soft_wrap=True, highlight=False, markup=False)
+        out.print(f"time {name}: {_time(clock)}", soft_wrap=True)
     lines = [note for report in reports for note in report.plan.notes]
     lines += [f"finding: {finding.message}" for report in reports for finding in report.findings]
     lines += [*table.notes, *(f"to be said: {text}" for text in proposed.open)]
     for line in dict.fromkeys(lines):
-        out.print(line, soft_wrap=True, highlight=False, markup=False)
+        out.print(line, soft_wrap=True)
 
 
 def _clocks(reports: Sequence[Report]) -> dict[str, TimeBase]:
@@ -92,9 +92,9 @@ def outline(values: Values) -> str:
 
 def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | None, figure: Path) -> None:
     """Print the rms of each record in bands, and what its density is."""
-    out = _console()
+    out = terminal()
     for one in found:
-        out.print(one.record.content, style="bold", soft_wrap=True, highlight=False, markup=False)
+        out.print(one.record.content, style="bold", soft_wrap=True)
         grid = Grid("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
         rate = angle = 0.0
         for band in one.bands(edges or one.decades()):
@@ -107,8 +107,7 @@ def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | N
         out.print(
             f"density {sides}, {one.method}; 95 % interval of a root density {low:.3f} to {high:.3f} times its value",
             soft_wrap=True,
-            highlight=False,
         )
         for note in one.notes:
-            out.print(note, soft_wrap=True, highlight=False, markup=False)
-    out.print(f"wrote {figure}", soft_wrap=True, highlight=False, markup=False)
+            out.print(note, soft_wrap=True)
+    out.print(f"wrote {figure}", soft_wrap=True)

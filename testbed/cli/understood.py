@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from testbed.cli.console import terminal
+from testbed.cli.terminal import step_words
+from testbed.runs.table import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rich.console import Console
+
     from testbed.judging.table_facts import TableFacts
     from testbed.scenario.model import Scenario
+    from testbed.sensors.data_sheet import Step
 
 
 def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
@@ -22,15 +33,69 @@ def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
     }
 
 
+def translations(scenario: Scenario) -> dict[str, list[Step]]:
+    """Return, for each sensor that is given in the words of a data sheet, what they became."""
+    steps = {
+        name: type(sensor).sheet(scenario.presets["sensors"][name], border=True).steps
+        for name, sensor in scenario.sensors.items()
+    }
+    return {name: found for name, found in steps.items() if found}
+
+
+def doubts(scenario: Scenario) -> list[str]:
+    """Return what does not fit together in the sensors, by name."""
+    return [f"{name}: {doubt}" for name, sensor in scenario.sensors.items() for doubt in sensor.doubts()]
+
+
 def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:
     """Return what `testbed check` tells a program."""
     return {
         "scenario": scenario.name,
         "file": str(scenario.file),
         "keys": understood(scenario),
+        "translations": {name: [asdict(step) for step in steps] for name, steps in translations(scenario).items()},
+        "doubts": doubts(scenario),
         "datasheets": {name: dict(sensor.datasheet()) for name, sensor in scenario.sensors.items()},
         "turntable": facts.summary(),
     }
+
+
+def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
+    """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
+    console = terminal()
+    table = Table(title=f"{scenario.name}: {scenario.file}", title_justify="left")
+    for heading in ("key", "as written", "understood (SI)"):
+        # Folded, never cut: a key is one long word.
+        table.add_column(heading, overflow="fold")
+    for key, value in understood(scenario).items():
+        table.add_row(key, value["written"], value["si"])
+    console.print(table)
+    for name, steps in translations(scenario).items():
+        words = Table("data sheet", "as written", "rule", "becomes", title=f"{name}: translated", title_justify="left")
+        for step in steps:
+            words.add_row(step.key, step.written, step.rule, step.becomes)
+        console.print(words)
+    for name, sensor in scenario.sensors.items():
+        if rows := sensor.datasheet():
+            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
+            for row in rows:
+                sheet.add_row(*row)
+            console.print(sheet)
+    _print_facts(console, facts)
+    console.print("The scenario is valid.")
+
+
+def _print_facts(console: Console, facts: TableFacts) -> None:
+    modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
+    torque = f"required torque {facts.required_torque:.4g} N m"
+    if facts.torque_limit is not None:
+        used = facts.required_torque / facts.torque_limit
+        torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
+    noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
+    step = step_words(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
+    for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
+        if line:
+            console.print(f"turntable: {line}", soft_wrap=True)
 
 
 def _text(value: Any) -> str:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from testbed.fusion.belief import check_belief
+from testbed.fusion.gate import Gate
 from testbed.fusion.kernels.covariance import HEADER_ROWS, RATE, STD
 from testbed.fusion.schedule import Schedule
+from testbed.fusion.start import StartKind
+from testbed.parts import Part
+from testbed.units import Rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,8 +23,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from testbed.fusion.belief import SensorBelief
-    from testbed.parts import Part
     from testbed.signals import FloatArray
+
+# YAML gives the words.
+Switch = Annotated[bool, Field(json_schema_extra={"type": ["boolean", "string"], "enum": [True, False, "on", "off"]})]
 
 _UNITS = {
     "innovation": "rad/s",
@@ -76,6 +83,24 @@ class Rows(NamedTuple):
         return [*self.once, *(name and f"{name}_{sensor}" for sensor in sensors for name in self.per_sensor)]
 
 
+class CommonParameters(Part):
+    """Parameters that every shipped filter has.
+
+    Parameters
+    ----------
+    start : {"unknown", "rest"}
+        What is known before the first reading: nothing, the record may begin in mid-motion, or that everything rests.
+    rest_rate : float
+        The constant rate of that rest, such as the Earth's share about the axis [rad/s].
+    gate : bool
+        Strike out readings that are none before the filter sees them (`testbed.fusion.gate`); on or off.
+    """
+
+    start: StartKind = "unknown"
+    rest_rate: Rate = 0.0
+    gate: Switch = True
+
+
 class BlockFilter:
     """Base of every filter: checks the blocks, spreads their readings over the fastest rate, names what comes out.
 
@@ -119,6 +144,7 @@ class BlockFilter:
             msg = f"belief: expected two sensors to divide the band between, got {list(sample_rate_hz)}"
             raise ValueError(msg)
         self.schedule = Schedule(sample_rate_hz)
+        self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
 
     @abstractmethod
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
@@ -151,10 +177,11 @@ class BlockFilter:
             If a sensor is missing, unknown or has not as many readings as are due.
         """
         Z = self.schedule.spread(readings)
-        # Here, before any filter sees them, is the place to strike out readings that are none.
+        gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
         Z.flags.writeable = False
         names = self.rows.names(self.schedule.sensors)
         out = np.full((HEADER_ROWS + len(names), Z.shape[1]), np.nan)
         self._advance(Z, out)
         shown = {name: row for name, row in zip(names, out[HEADER_ROWS:], strict=True) if name is not None}
+        shown |= {f"gated_{name}": count for name, count in zip(self.schedule.sensors, gated, strict=True)}
         return EstimateBlock(out[RATE], out[STD], shown)

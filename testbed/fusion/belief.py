@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from testbed.errors import UnknownNameError
 from testbed.parts import Part
-from testbed.units import RateDensity
+from testbed.units import Frequency, Range, RateDensity, RateRandomWalk, RateStd
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -66,6 +66,20 @@ class SensorBelief(Part):
         Two-sided root density of the noise that passes the dynamics [rad/sqrt(s)].
     output_noise : float
         Two-sided root density of the noise on the reading [rad/sqrt(s)].
+    noise_knee : float, optional
+        Where 1/f noise on the reading equals its white noise [Hz].
+    bias_instability : float
+        B of 1/f noise that passes the dynamics [rad/s]; S = B^2 / (2 pi f).
+    rate_random_walk : float
+        K of a random walk that passes the dynamics [rad/s^1.5].
+    turn_on_bias : float
+        Standard deviation of a constant that passes the dynamics [rad/s].
+    lowest_frequency : float
+        Below this the 1/f densities are constant [Hz].
+    range : float, optional
+        Readings at or beyond this are no rate [rad/s].
+    resolution : float, optional
+        Step of the readings [rad/s].
     source : str
         Where it is from, as shown beside results: the name of a shipped belief, "exact" or "given". It changes nothing.
     """
@@ -74,12 +88,50 @@ class SensorBelief(Part):
     denominator: tuple[Coefficient, ...]
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
+    noise_knee: Frequency | None = None
+    bias_instability: RateStd = 0.0
+    rate_random_walk: RateRandomWalk = 0.0
+    turn_on_bias: RateStd = 0.0
+    lowest_frequency: Frequency = 1e-4
+    range: Range | None = None
+    resolution: Range | None = None
     source: str = "given"
 
     @model_validator(mode="after")
     def _check(self) -> SensorBelief:
         self.realisation()
         return self
+
+    @property
+    def n_pole(self) -> int:
+        """Number of poles, and of states of the realisation."""
+        return np.trim_zeros(np.asarray(self.denominator), "f").size - 1
+
+    @property
+    def sees_constant(self) -> bool:
+        """Whether a constant rate shows in the reading at all."""
+        return self.numerator[-1] != 0.0
+
+    def inner_slow_density(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the density of the 1/f noise that passes the dynamics [rad^2/s], at frequencies above zero [Hz]."""
+        density: FloatArray = self.bias_instability**2 / (2.0 * np.pi * np.maximum(freq_hz, self.lowest_frequency))
+        return density
+
+    def outer_slow_density(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the density of the 1/f noise on the reading [rad^2/s], at frequencies above zero [Hz]."""
+        knee = self.noise_knee or 0.0
+        density: FloatArray = self.output_noise**2 * knee / np.maximum(freq_hz, self.lowest_frequency)
+        return density
+
+    def slow_density(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the density on the reading of all noise that is not white [rad^2/s], at frequencies above zero [Hz].
+
+        The turn-on bias, which is constant, has none.
+        """
+        power = np.abs(self.realisation().response(freq_hz)) ** 2
+        walk = (self.rate_random_walk / (2.0 * np.pi * freq_hz)) ** 2
+        density: FloatArray = power * (self.inner_slow_density(freq_hz) + walk) + self.outer_slow_density(freq_hz)
+        return density
 
     def transfer_function(self) -> control.TransferFunction:
         """Return the noise-free dynamics as a python-control transfer function."""

@@ -1,9 +1,9 @@
 r"""The augmented linear model of the fusion filters, equations (7), (18)-(20) of paper 1 for any signal order and any
 sensors.
 
-State x = [x_1, its m - 1 derivatives, states of sensor 1, states of sensor 2, ...]. x_1 [rad/s] is the true rate,
-driven through m integrators by white noise of density q; it drives every sensor, whose white input noise enters beside
-it.
+State x = [x_1, its m - 1 derivatives, states of sensor 1, states of sensor 2, ..., slow noise]. x_1 [rad/s] is the true
+rate, driven through m integrators by white noise of density q; it drives every sensor, whose white input noise enters
+beside it. The states of slow noise (`testbed.fusion.coloured`) stand last: each moves by itself.
 """
 
 from __future__ import annotations
@@ -13,23 +13,33 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 
 from testbed.fusion.belief import check_belief
+from testbed.fusion.coloured import slow_noise
 from testbed.fusion.schedule import common_clock
+from testbed.fusion.start import (
+    REST_STD,
+    StartKind,
+    alternating_response,
+    constant_response,
+    own_covariance,
+    unknown_spread,
+)
+from testbed.signals import van_loan
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
 # Derivatives of the rate are kept per 10 ms, so that they are of the rate's own size in the band of interest.
 _TIME_UNIT = 1e-2
+# The derivatives of the rate at the start: of 1 deg/s at 100 Hz.
 _START_STD = math.radians(1.0)
-# The sensor states start close to rest but not certain: 1e-6 (deg/s)^2 would keep an error of the first reading for
-# tens of seconds.
-_START_STD_SENSOR = math.radians(1e-2)
 _START_FREQ_HZ = 100.0
 
 
@@ -51,6 +61,12 @@ class FusionModel:
         Readings from states [-].
     R : ndarray, shape (n_sensor,)
         Variance of a reading [rad^2/s^2].
+    still : ndarray, shape (n_state,)
+        The states in equilibrium with a unit constant rate [-].
+    n_core : int
+        Number of states of signal and sensors; those of slow noise follow.
+    owners : ndarray of int, shape (n_state,)
+        The sensor that each state belongs to, -1 for the signal's.
     """
 
     sensors: tuple[str, ...]
@@ -61,6 +77,9 @@ class FusionModel:
     H: FloatArray
     R: FloatArray
     P0: FloatArray
+    still: FloatArray
+    n_core: int
+    owners: NDArray[np.int64]
 
 
 def build_model(
@@ -70,6 +89,8 @@ def build_model(
     order: int,
     q: float,
     use_input_noise: bool = True,
+    coloured: bool = False,
+    start: StartKind = "unknown",
 ) -> FusionModel:
     """Assemble and discretise the model of the sensors that have a sample rate.
 
@@ -85,6 +106,10 @@ def build_model(
         Two-sided density of that noise [rad^2/s^(2m+1)].
     use_input_noise : bool, optional
         Count the sensors' input noise as process noise; False is the form of the paper.
+    coloured : bool, optional
+        Give the slow noise of the sensors states of its own.
+    start : {"unknown", "rest"}, optional
+        What P0 knows (`testbed.fusion.start`).
 
     Returns
     -------
@@ -105,15 +130,73 @@ def build_model(
     fastest, strides = common_clock(sample_rate_hz)
     believed = [belief[name] for name in sensors]
     A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
+    owners = np.concatenate([np.full(order, -1), *(np.full(one.n_pole, i) for i, one in enumerate(believed))])
+    n_core = len(A)
+    slow_variance = np.zeros(0)
+    if coloured:
+        A, Qc, H, owners, slow_variance = _with_slow_noise(believed, A, Qc, H, owners)
     F, Q = van_loan(A, Qc, 1.0 / fastest)
     R = np.array([one.output_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
-    return FusionModel(sensors, fastest, strides, F, Q, H, R, _start_covariance(order, F.shape[0]))
+    P0, still = _start(believed, A, Qc, order, slow_variance, start)
+    return FusionModel(sensors, fastest, strides, F, Q, H, R, P0, still, n_core, owners)
 
 
-def _start_covariance(order: int, n_state: int) -> FloatArray:
-    std = np.full(n_state, _START_STD_SENSOR)
-    std[:order] = _START_STD * (2.0 * np.pi * _START_FREQ_HZ * _TIME_UNIT) ** np.arange(order)
-    return np.diag(std**2)
+def _with_slow_noise(
+    believed: list[SensorBelief], A: FloatArray, Qc: FloatArray, H: FloatArray, owners: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64], FloatArray]:
+    """Return the matrices with the states of slow noise behind the others, and the variance of those states at the
+    start.
+    """
+    noises = [slow_noise(one) for one in believed]
+    n, slow = len(A), [(i, part) for i, one in enumerate(noises) for part in (one.inner, one.outer)]
+    rate, variance, drive = (
+        np.concatenate([getattr(part, name) for _, part in slow]) for name in ("rate", "variance", "drive")
+    )
+    A, Qc = block_diag(A, np.diag(-rate)), block_diag(Qc, np.diag(drive))
+    H = np.hstack([H, np.zeros((len(H), rate.size))])
+    at = n
+    for i, (inner, outer) in enumerate((one.inner, one.outer) for one in noises):
+        # Noise before the dynamics enters where the rate does.
+        mine = np.flatnonzero(owners == i)
+        A[mine, at : at + inner.rate.size] = A[mine, :1]
+        H[i, at : at + inner.rate.size] = H[i, 0]
+        at += inner.rate.size
+        H[i, at : at + outer.rate.size] = 1.0
+        at += outer.rate.size
+    owners = np.concatenate([owners, *(np.full(part.rate.size, i) for i, part in slow)])
+    return A, Qc, H, owners, variance
+
+
+def _start(
+    believed: list[SensorBelief],
+    A: FloatArray,
+    Qc: FloatArray,
+    order: int,
+    slow_variance: FloatArray,
+    start: StartKind,
+) -> tuple[FloatArray, FloatArray]:
+    """Return P0 and the states for a unit constant rate; the equations stand in `testbed.fusion.start`."""
+    rest = slice(order, None)
+    sensors, drive = A[rest, rest], A[rest, 0]
+    P0 = np.zeros_like(A)
+    P0[rest, rest] = own_covariance(sensors, Qc[rest, rest])
+    first = len(sensors) - slow_variance.size
+    for j, variance in zip(range(first, len(sensors)), slow_variance, strict=True):
+        if not sensors[j].any():
+            held = constant_response(sensors, sensors[:, j]) + np.eye(len(sensors))[j]
+            P0[rest, rest] += variance * np.outer(held, held)
+    still = np.zeros(len(A))
+    still[0], still[rest] = 1.0, constant_response(sensors, drive)
+    for k in range(1, order):
+        P0[k, k] = (_START_STD * (2.0 * np.pi * _START_FREQ_HZ * _TIME_UNIT) ** k) ** 2
+    if start == "rest":
+        P0 += REST_STD**2 * np.outer(still, still)
+    else:
+        spread = unknown_spread(believed)
+        moving = np.zeros(len(A))
+        moving[0], moving[rest] = 1.0, np.abs(alternating_response(sensors, drive))
+        P0 += spread.constant**2 * np.outer(still, still) + np.diag((spread.alternating * moving) ** 2)
+    return P0, still
 
 
 def continuous_model(
@@ -159,38 +242,6 @@ def continuous_model(
             Qc[part, part] = sensor.input_noise**2 * np.outer(one.B, one.B)
         at = part.stop
     return A, Qc, H
-
-
-def van_loan(A: FloatArray, Qc: FloatArray, T: float) -> tuple[FloatArray, FloatArray]:
-    r"""Discretise x' = A x + white noise of density Qc over a step T.
-
-    .. math:: F = e^{A T}, \quad Q = \int_0^T e^{A s} Q_c e^{A' s} ds
-
-    by one matrix exponential (Van Loan 1978) over T / 2^k, doubled k times: exp(-A T) of a fast pole would overflow or
-    cancel otherwise.
-
-    Parameters
-    ----------
-    A, Qc : ndarray, shape (n_state, n_state)
-        Dynamics [1/s] and density of the white noise [state^2/s].
-    T : float
-        Step [s].
-
-    Returns
-    -------
-    F, Q : ndarray, shape (n_state, n_state)
-        Transition [-] and covariance [state^2], symmetric.
-    """
-    n = A.shape[0]
-    doublings = max(0, math.ceil(math.log2(max(float(np.linalg.norm(A, 1)) * T, 1e-300))))
-    step = T / 2**doublings
-    power = expm(np.block([[-A, Qc], [np.zeros((n, n)), A.T]]) * step)
-    F: FloatArray = power[n:, n:].T.copy()
-    Q: FloatArray = F @ power[:n, n:]
-    for _ in range(doublings):
-        Q = Q + F @ Q @ F.T
-        F = F @ F
-    return F, 0.5 * (Q + Q.T)
 
 
 def covariance_root(P: FloatArray) -> FloatArray:

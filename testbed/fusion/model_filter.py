@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
-from testbed.fusion.base import BlockFilter
+from testbed.fusion.base import BlockFilter, CommonParameters, Switch
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
-from testbed.parts import Part
 from testbed.units import Quantity
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def signal_noise_unit(order: int) -> str:
     return f"rad^2/s^{2 * order + 1}"
 
 
-class FilterParameters(Part):
+class FilterParameters(CommonParameters):
     """Parameters of the signal model, common to the filters.
 
     Parameters
@@ -49,6 +48,8 @@ class FilterParameters(Part):
         takes the filter's own.
     use_input_noise : bool
         Count the input noise of the belief as process noise.
+    coloured : bool
+        Give the belief's slow noise (1/f, turn-on bias, rate random walk) states of its own.
     """
 
     default_q: ClassVar[dict[int, float]] = {}
@@ -56,6 +57,7 @@ class FilterParameters(Part):
     order: Annotated[int, Field(ge=1, le=3)] = 1
     q: Annotated[float, Field(validate_default=True, json_schema_extra=_Q_SCHEMA)] = cast("float", None)
     use_input_noise: bool = True
+    coloured: Switch = False
 
     @field_validator("q", mode="before")
     @classmethod
@@ -99,6 +101,19 @@ class CovarianceParameters(FormParameters):
     precision: Literal["double", "single"] = "double"
 
 
+def initial_state(model: FusionModel, parameters: CommonParameters) -> FloatArray:
+    """Return the state before the first reading, shape (n_state,): zero, or in equilibrium with a known rest.
+
+    Parameters
+    ----------
+    model : FusionModel
+        The augmented model.
+    parameters : CommonParameters
+        What is known.
+    """
+    return model.still * (parameters.rest_rate if parameters.start == "rest" else 0.0)
+
+
 class ModelFilter(BlockFilter):
     """A filter that runs on the augmented model of `testbed.fusion.model`, in the form and precision of its parameters.
 
@@ -124,11 +139,17 @@ class ModelFilter(BlockFilter):
         form = parameters.form if isinstance(parameters, FormParameters) else "joseph"
         precision = parameters.precision if isinstance(parameters, CovarianceParameters) else "double"
         self.model: FusionModel = build_model(
-            belief, sample_rate_hz, order=parameters.order, q=parameters.q, use_input_noise=parameters.use_input_noise
+            belief,
+            sample_rate_hz,
+            order=parameters.order,
+            q=parameters.q,
+            use_input_noise=parameters.use_input_noise,
+            coloured=parameters.coloured,
+            start=parameters.start,
         )
         self._form = FORMS[form]
         kind = np.float32 if precision == "single" else np.float64
-        self._x = np.zeros(self.model.F.shape[0], kind)
+        self._x = initial_state(self.model, parameters).astype(kind)
         self._F, self._H = self.model.F.astype(kind), self.model.H.astype(kind)
         self._P, self._Q = self.carried(self.model.P0), self.carried(self.model.Q)
 

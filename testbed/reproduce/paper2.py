@@ -74,7 +74,7 @@ def switched_on(**parameters: Any) -> AllanSrkf:
         Of the filter.
     """
     clock = dict.fromkeys(CHANNELS[:2], BASE_RATE_HZ)
-    return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**parameters))
+    return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**{"start": "rest", **parameters}))
 
 
 def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]:

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.fusion.analysis.identify import identify
-from testbed.fusion.belief import load_belief
+from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.parts import preset
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from testbed.fusion.belief import SensorBelief
     from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
-# The word for the simulator's own response and noise.
+# The word for the simulator's own response and noise, and that for what a preset itself says.
 EXACT = "exact"
+DATA_SHEET = "data_sheet"
 
 _LOWEST_HZ, _POINTS = 1e-2, 121
 _FIT_MISFIT = 1e-3
@@ -29,6 +29,15 @@ _FIT_MISFIT = 1e-3
 _FORMS = tuple((n % 2, n // 2) for n in range(1, 8))
 # The noise is fitted from here up [Hz]: what rises below (1/f) is not in it.
 _WHITE_FROM_HZ = 1.0
+# What a belief and a sensor call by the same name.
+_SLOW = (
+    "noise_knee",
+    "bias_instability",
+    "rate_random_walk",
+    "turn_on_bias",
+    "lowest_frequency",
+    "resolution",
+)
 # An output noise this much below the input noise keeps R positive and changes nothing.
 _LEAST_OUTPUT = 3e-4
 
@@ -85,7 +94,30 @@ def preset_belief(name: str) -> SensorBelief | None:
         If there is no such preset.
     """
     content = preset("testbed.sensors", name)
+    if content.get("belief") == DATA_SHEET:
+        return sheet_belief(load_preset(name))
     return load_belief(content["belief"])[content["type"]] if "belief" in content else None
+
+
+def sheet_belief(sensor: Sensor) -> SensorBelief:
+    """Return what the data sheet of an instrument says of it.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The instrument, given in the words of its data sheet.
+
+    Returns
+    -------
+    SensorBelief
+        With `source` "data_sheet".
+
+    Raises
+    ------
+    ValueError
+        If it is of a kind whose data sheet says too little.
+    """
+    return SensorBelief(**sensor.sheet_belief(), source=DATA_SHEET)
 
 
 def exact_belief(sensor: Sensor) -> SensorBelief:
@@ -120,8 +152,8 @@ def believed(sensor: Sensor) -> SensorBelief | None:
     """Return the rational model and white noise that come closest to what a sensor is, None if none is within 0.1 %.
 
     The response is fitted from 0.01 Hz to half the sensor's sample rate by the fewest poles that do; the noise is an
-    input and an output level, fitted to the input-referred density from 1 Hz up (relative, non-negative): what rises
-    below 1 Hz (1/f) is not in it.
+    input and an output level, fitted to the input-referred density from 1 Hz up (relative, non-negative); the
+    coefficients of the slow noise, the range and the step of the readings are the sensor's own.
 
     Parameters
     ----------
@@ -154,7 +186,7 @@ def _search(sensor: Sensor) -> SensorBelief | None:
                 found = fit.belief(input_noise=inner, output_noise=max(outer, _LEAST_OUTPUT * inner))
             except ValueError:  # poles that coincide have no modal form; more poles may lie apart
                 continue
-            return found.model_copy(update={"source": EXACT})
+            return found.model_copy(update={"source": EXACT, **_slow_and_ends(sensor)})
     return None
 
 
@@ -185,3 +217,14 @@ def excess_density(sensor: Sensor, belief: SensorBelief) -> Callable[[FloatArray
         return kept
 
     return density
+
+
+def _slow_and_ends(sensor: Sensor) -> dict[str, Any]:
+    """Return the coefficients of a sensor's slow noise, its range and the step of its readings, as a belief names them.
+
+    Without noise there is no rounding either, so that a sensor at rest rightly repeats itself.
+    """
+    ends = {"range": sensor.full_scale()}
+    if not sensor.noise:
+        return ends
+    return ends | {name: value for name in _SLOW if (value := getattr(sensor, name, None)) is not None}

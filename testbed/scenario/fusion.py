@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from testbed.document import Key
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.scenario.intake import Intake
     from testbed.sensors.base import Sensor
 
@@ -35,12 +36,15 @@ class Fusion:
         The instruments that could be built, and the types of all.
     data_sheets : mapping of str to SensorBelief or None
         What the presets of the sensors say of them.
+    turntable : TurntableParameters or None
+        What carries them, which rests at t = 0.
     """
 
     intake: Intake
     sensors: Mapping[str, Sensor]
     types: Mapping[str, str]
     data_sheets: Mapping[str, SensorBelief | None]
+    turntable: TurntableParameters | None
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
@@ -65,10 +69,29 @@ class Fusion:
             return None
         belief = self._belief(written, (*key, "belief"))
         model = getattr(factory, "Parameters", None)
+        entry = {**self._at_rest(model, entry), **entry}
         parameters = entry if model is None else self.intake.validate(model, entry, key, shipped=kind in FILTERS)
         if parameters is None or belief is None:
             return None
-        return FilterSpec(kind, factory, parameters, belief)
+        return FilterSpec(kind, factory, parameters, self._without_rounding(belief))
+
+    def _without_rounding(self, belief: Mapping[str, SensorBelief]) -> dict[str, SensorBelief]:
+        """Return the belief without a step of the readings for sensors without noise: they do not round, and rightly
+        repeat themselves at rest.
+        """
+        silent = {name for name, sensor in self.sensors.items() if not sensor.noise}
+        return {
+            name: one.model_copy(update={"resolution": None}) if name in silent else one for name, one in belief.items()
+        }
+
+    def _at_rest(self, model: Any, entry: Mapping[str, Any]) -> dict[str, str]:
+        """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at
+        the Earth's rate where that is on.
+        """
+        if "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
+            return {}
+        earth = None if self.turntable is None else self.turntable.earth_rate
+        return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
 
     def _find(self, key: Key, message: str) -> None:
         self.intake.document.find(key, message)

@@ -20,7 +20,7 @@ from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake, unresolved
 from testbed.scenario.model import Bound, Frame, Scenario
-from testbed.sensors import SENSORS
+from testbed.sensors import SENSORS, with_preset
 from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ class _Reader:
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = Fusion(self._intake, sensors, types, self._data_sheets).read(parts["fusion"])
+        fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
@@ -196,6 +196,8 @@ class _Reader:
         if name is None:
             return rest
         try:
+            if package == "testbed.sensors":
+                return with_preset(str(name), rest)
             return merge(preset(package, str(name)), rest)
         except UnknownNameError as error:
             self._doc.find((*key, "preset"), str(error))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from testbed.parts import preset, preset_names, resolve
+from testbed.parts import lay_over, merge, preset, preset_names, resolve
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from testbed.sensors.base import Sensor
 
 SENSORS = {
@@ -14,6 +16,30 @@ SENSORS = {
     "mems_gyro": "testbed.sensors.mems_gyro:MemsGyro",
     "mhd_ars": "testbed.sensors.mhd_ars:MhdArs",
 }
+
+
+def with_preset(name: str, entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a shipped instrument with those of its user laid over them.
+
+    What the user says in other words, such as a `rate_noise_density` over an `angle_random_walk`, is said once.
+
+    Parameters
+    ----------
+    name : str
+        Of the preset.
+    entry : mapping
+        The user's keys.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such preset.
+    """
+    base = preset(__name__, name)
+    kind = entry.get("type", base["type"])
+    if kind in SENSORS:
+        base = lay_over(base, entry, resolve("sensor", kind, SENSORS).ways())
+    return merge(base, entry)
 
 
 def load_preset(name: str) -> Sensor:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
+from pydantic import ModelWrapValidatorHandler, ValidationError, ValidationInfo, model_validator
 
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
+from testbed.sensors.data_sheet import Sheet, Word
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import Frequency
 
@@ -94,11 +97,73 @@ class Sensor(Part):
         range stay.
     mounting : Mounting
         Where it sits on the table and how far its axis is off.
+
+    Attributes
+    ----------
+    words : tuple of Word
+        Keys of data sheets that it takes in place of parameters.
     """
+
+    words: ClassVar[tuple[Word, ...]] = ()
 
     sample_rate: Frequency
     noise: bool = True
     mounting: Mounting = Mounting()
+
+    @classmethod
+    def sheet(cls, values: Mapping[str, Any], *, border: bool) -> Sheet:
+        """Return the keys of a file with those of data sheets turned into parameters, and how that was done.
+
+        Parameters
+        ----------
+        values : mapping
+            The keys as they stand.
+        border : bool
+            Whether they are strings with units, as in a file.
+        """
+        sheet = Sheet(values, border=border)
+        for word in cls.words:
+            sheet.translate(word)
+        return sheet
+
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file, those of data sheets included."""
+        return [*cls.model_fields, *(word.key for word in cls.words)]
+
+    @classmethod
+    def ways(cls) -> tuple[tuple[tuple[str, ...], ...], ...]:
+        """Return, for each quantity that can be said in several ways, the keys of each way."""
+        return tuple(((word.key,), (word.field,)) for word in cls.words)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read_sheet(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        if not isinstance(data, Mapping):
+            return handler(data)
+        sheet = cls.sheet(data, border=bool((info.context or {}).get("border")))
+        try:
+            found = handler(sheet.values)
+        except ValidationError as error:
+            raise sheet.beside(error) from error
+        if sheet.problems:
+            raise sheet.refusal(cls.__name__)
+        return found
+
+    def sheet_belief(self) -> dict[str, Any]:
+        """Return what its data sheet lets a filter believe: the fields of a belief, in SI.
+
+        Raises
+        ------
+        ValueError
+            If a data sheet of this kind of instrument says too little.
+        """
+        msg = f"{type(self).__name__}: a data sheet says too little of it; name a belief, or take 'belief: exact'"
+        raise ValueError(msg)
+
+    def doubts(self) -> list[str]:
+        """Return what does not fit together although each value may be right, for people to read."""
+        return []
 
     @abstractmethod
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
@@ -150,7 +215,8 @@ class Sensor(Part):
 
     @abstractmethod
     def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
-        """Return the instrument at rest.
+        """Return the instrument as it has stood for long under the rate that is on at its first sample, its noise
+        stationary.
 
         Parameters
         ----------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numba import njit
@@ -10,6 +10,7 @@ from numba import njit
 from testbed.models.fog_thermal import FogThermal
 from testbed.parts import Part
 from testbed.sensors.base import Decimator, Sensor, Surroundings, rate_ratio
+from testbed.sensors.data_sheet import GYRO_WORDS, Word
 from testbed.sensors.gyro_errors import GainError
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
@@ -41,7 +42,7 @@ class Thermometer(Part):
 
 
 class Fog(Sensor, GyroTerms):
-    r"""A fibre-optic gyro as its user sees it: the mean rate over each output interval, and a temperature.
+    r"""A fibre-optic or ring-laser gyro as its user sees it: the mean rate over each output interval, a temperature.
 
     .. math:: y_j = \frac{1}{T} \int_{t_j - T}^{t_j} L[(1 + s + s_T (T_c - T_0)) w + b] \, dt + n_j
 
@@ -62,7 +63,14 @@ class Fog(Sensor, GyroTerms):
         Bias by temperature, and the temperatures inside.
     thermometer : Thermometer
         The thermometer inside.
+
+    Notes
+    -----
+    Of the keys of data sheets it takes `output_rate`, `full_scale`, `rate_noise_density` (one-sided) and
+    `in_run_bias_stability` (Allan floor); see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = GYRO_WORDS
 
     bandwidth: Frequency
     range: Range
@@ -120,6 +128,11 @@ class Fog(Sensor, GyroTerms):
         gain = np.abs(self.response(freq_hz[seen])) ** 2
         density[seen] = self.noise_psd(freq_hz[seen], self.sample_rate) / gain
         return density
+
+    def sheet_belief(self) -> dict[str, Any]:
+        """Return low-pass and white noise on the reading; see `Sensor.sheet_belief`."""
+        numerator, denominator = self.transfer_function
+        return {"numerator": numerator, "denominator": denominator, "output_noise": self.angle_random_walk}
 
     def datasheet(self) -> list[tuple[str, str]]:
         """Return noise and thermal coefficients in data-sheet units; see `Sensor.datasheet`."""

@@ -157,7 +157,7 @@ class GyroErrors(Part):
 
 
 class Fir:
-    """Weighted sum of the newest samples, at rest before the first; any division into blocks gives the same bits.
+    """Weighted sum of the newest samples, the first one for ever before it; the same bits for any division into blocks.
 
     Parameters
     ----------
@@ -167,11 +167,15 @@ class Fir:
 
     def __init__(self, weights: FloatArray) -> None:
         self._weights, self._state = weights, np.zeros(max(weights.size - 1, 1))
+        self._started = False
 
     def process(self, u: FloatArray) -> FloatArray:
         """Return the filtered samples, shape (n_time,), unit of `u`."""
         if self._weights.size == 1 or not u.size:
             return u
+        if not self._started:
+            # Each delayed sum holds what is left of a constant's.
+            self._state, self._started = np.cumsum(self._weights[:0:-1])[::-1] * u[0], True
         y: FloatArray
         # With a second coefficient, though zero, below: a lone one would choose a convolution that depends on the
         # block.
@@ -180,7 +184,8 @@ class Fir:
 
 
 class AgedSampler:
-    """Takes every `ratio`-th sample, each a little old: a straight line between the samples around its instant.
+    """Takes every `ratio`-th sample, each a little old: a straight line between the samples around its instant; the
+    first sample stands for all before it.
 
     Parameters
     ----------
@@ -194,10 +199,12 @@ class AgedSampler:
 
     def __init__(self, ratio: int, spread: float, stream: np.random.Generator | None) -> None:
         self._ratio, self._spread, self._stream, self._skip = ratio, spread, stream, 0
-        self._past = np.zeros(int(np.ceil(spread)) + 1)
+        self._past = np.full(int(np.ceil(spread)) + 1, np.nan)
 
     def process(self, samples: FloatArray) -> FloatArray:
         """Return the readings that the clock takes in this block, unit of `samples`."""
+        if samples.size and np.isnan(self._past).all():
+            self._past[:] = samples[0]
         line = np.concatenate([self._past, samples])
         due = np.arange(self._skip, samples.size, self._ratio) + self._past.size
         self._skip = (self._skip - samples.size) % self._ratio

@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
-from testbed.sensors.noise_terms import NoiseStage
+from testbed.sensors.noise_terms import NoiseStage, Ramp
+from testbed.sensors.sampled_noise import Rational
 from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
-from testbed.units import Frequency, Quantity, Range
+from testbed.units import Frequency, Quantity, Range, RateStd
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from typing import Self
 
     from numpy.typing import ArrayLike
 
     from testbed.signals import ComplexArray, FloatArray
 
-# Base clock of a run, at which the noise enters.
-
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
+# A stated total noise is a typical figure: as far as this from what density and bandwidth make it is no contradiction.
+_TRUSTED = 0.15
 Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+
+
+def _whole_word(given: dict[str, Any]) -> float:
+    """Return the sensitivity [LSB s/rad] of a word that spans the range, from the fields read before."""
+    return float(2 ** (given.get("word_bits", 32) - 1) - 1) / float(given.get("range", 1.0))
 
 
 class MemsGyro(GyroErrors, Sensor, GyroTerms):
     """A MEMS gyro as its user sees it: readings in rad/s.
 
     One chain: true rate, constant errors, noise, low-pass, decimation filter, reading clock, dead band, range and word,
-    lost readings. The noise is added to the rate and passes the low-pass with it, as in the real chip. The low-pass is
+    lost readings. The noise is referred to the rate and passes the low-pass with it, as in the real chip; it is drawn
+    behind it, at the rate of the readings, or at the clock of the run where `fir` or `jitter` follow. The low-pass is
     given either by its coefficients or as a second order with `corner` and `damping`.
 
     Parameters
@@ -44,19 +53,46 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         Its damping ratio [-].
     range : float
         Readings saturate at plus and minus this [rad/s].
-    sensitivity : float
-        Counts per rate of the output word [LSB s/rad].
     word_bits : int
         Length of the output word, two's complement [-].
+    sensitivity : float
+        Counts per rate of the output word [LSB s/rad]; left out, the word spans the range.
+    total_rms_noise : float, optional
+        What the data sheet says that the noise comes to [rad/s]: compared with what it does, see `doubts`.
+
+    Notes
+    -----
+    Data sheets have other keys, which are read too: `output_rate`, `full_scale`, `rate_noise_density` (one-sided),
+    `in_run_bias_stability` (Allan floor), `bandwidth` (-3 dB) with `order` (2); see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = GYRO_WORDS
 
     numerator: Coefficients | None = None
     denominator: Coefficients | None = None
     corner: Frequency | None = None
     damping: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 0.5**0.5
     range: Range
-    sensitivity: WordSensitivity
     word_bits: Annotated[int, Field(strict=True, ge=2, le=32)] = 32
+    sensitivity: WordSensitivity = Field(default_factory=_whole_word)
+    total_rms_noise: RateStd | None = None
+
+    @classmethod
+    def sheet(cls, values: Mapping[str, Any], *, border: bool) -> Sheet:
+        """Return the keys of a file with those of data sheets turned into parameters; see `Sensor.sheet`."""
+        sheet = super().sheet(values, border=border)
+        sheet.translate_low_pass()
+        return sheet
+
+    @classmethod
+    def known_keys(cls) -> list[str]:
+        """Return every key that may stand in a file; see `Sensor.known_keys`."""
+        return [*super().known_keys(), *LOW_PASSES[-1]]
+
+    @classmethod
+    def ways(cls) -> tuple[tuple[tuple[str, ...], ...], ...]:
+        """Return the keys that say the same; see `Sensor.ways`."""
+        return (*super().ways(), LOW_PASSES)
 
     @model_validator(mode="after")
     def _one_low_pass(self) -> Self:
@@ -82,6 +118,11 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
             )
             raise ValueError(msg)
         return self
+
+    @property
+    def resolution(self) -> float:
+        """One count of the word [rad/s]."""
+        return 1.0 / self.sensitivity
 
     @property
     def transfer_function(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -117,11 +158,41 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         return float(min(self.range, (2 ** (self.word_bits - 1) - 1) / self.sensitivity))
 
     def input_noise_psd(self, freq_hz: FloatArray) -> FloatArray:
-        """Return the noise referred to the true rate, its terms at 20 kHz; see `Sensor.input_noise_psd`."""
-        rounding = rounding_psd(1.0 / self.sensitivity, self.sample_rate)
-        terms = self.noise_psd(freq_hz, BASE_RATE_HZ) / (1.0 + self.scale_factor_error) ** 2
+        """Return the noise referred to the true rate; see `Sensor.input_noise_psd`."""
+        rounding = rounding_psd(self.resolution, self.sample_rate)
+        terms = self.noise_psd(freq_hz) / (1.0 + self.scale_factor_error) ** 2
         density: FloatArray = terms + rounding / np.abs(self.response(freq_hz)) ** 2
         return density
+
+    def sheet_belief(self) -> dict[str, Any]:
+        """Return low-pass, white noise before it and rounding behind it; see `Sensor.sheet_belief`."""
+        numerator, denominator = self.transfer_function
+        rounding = rounding_psd(self.resolution, self.sample_rate) ** 0.5
+        return {
+            "numerator": numerator,
+            "denominator": denominator,
+            "input_noise": self.angle_random_walk,
+            # Of a fine word it keeps R positive and changes nothing.
+            "output_noise": max(rounding, 3e-4 * self.angle_random_walk),
+        }
+
+    def output_rms(self) -> float:
+        """Return the noise of the readings from 0.1 Hz up, all that folds in and the rounding included [rad/s]."""
+        freq = np.geomspace(0.1, 1e6, 4000)
+        power = self.noise_psd(freq) * np.abs(self.response(freq) / (1.0 + self.scale_factor_error)) ** 2
+        return float(np.sqrt(2.0 * np.trapezoid(power, freq) + 1.0 / (12.0 * self.sensitivity**2)))
+
+    def doubts(self) -> list[str]:
+        """Return where the stated total noise is not what density and bandwidth make; see `Sensor.doubts`."""
+        stated, made = self.total_rms_noise, self.output_rms()
+        if not stated or abs(stated / made - 1.0) <= _TRUSTED:
+            return []
+        twice = abs(stated / made / 2.0**0.5 - 1.0) <= _TRUSTED
+        hint = "the density may be two-sided: give it as angle_random_walk" if twice else "see bandwidth and order"
+        stated_deg, made_deg = np.rad2deg([stated, made])
+        return [
+            f"total_rms_noise is {stated_deg:.4g} deg/s, but density and bandwidth make {made_deg:.4g} deg/s: {hint}"
+        ]
 
     def datasheet(self) -> list[tuple[str, str]]:
         """Return the noise in data-sheet units and what it comes to; see `Sensor.datasheet`."""
@@ -138,13 +209,13 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
             ("rate random walk K", f"{60.0 * hour * self.rate_random_walk:.6g} deg/h/sqrt(h)"),
             ("quantisation Q", f"{1e6 * self.quantization:.6g} urad"),
             ("Markov bias, correlation time", f"{hour * self.markov_bias:.6g} deg/h, {self.markov_time:g} s"),
-            ("one count of the word", f"{np.rad2deg(1.0 / self.sensitivity):.6g} deg/s"),
+            ("one count of the word", f"{np.rad2deg(self.resolution):.6g} deg/s"),
             *((f"Allan deviation at {tau:g} s, before the low-pass", f"{allan[tau]:.6g} deg/h") for tau in allan),
             ("delay by decimation and age", f"{1e3 * delay:.6g} ms"),
         ]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MemsGyroStage:
-        """Return the gyro at rest; see `Sensor.start`."""
+        """Return the gyro in equilibrium with its first sample, its noise stationary; see `Sensor.start`."""
         return MemsGyroStage(self, input_rate_hz, seed, name)
 
 
@@ -162,15 +233,19 @@ class MemsGyroStage:
             return random_stream(seed, name, term)
 
         self._turn_on = gyro.turn_on_bias * stream("turn_on_bias").standard_normal() if gyro.noise else 0.0
-        self._noise = NoiseStage(gyro.noise_terms(input_rate_hz, seed, name) if gyro.noise else {})
         numerator, denominator = gyro.transfer_function
+        # Weights and ages work on the samples of the run, so their noise has to be there too.
+        self._early = gyro.fir is not None or gyro.jitter > 0.0
+        passed, rate_hz = Rational(numerator, denominator), input_rate_hz if self._early else gyro.sample_rate
+        self._noise = NoiseStage(gyro.sampled_terms(passed, rate_hz, seed, name) if gyro.noise else {})
+        self._ramp = Ramp(gyro.rate_ramp if gyro.noise else 0.0, input_rate_hz)
         self._low_pass = LinearFilter(list(numerator), list(denominator), input_rate_hz)
         self._fir = Fir(gyro.weights(ratio))
         self._decimator: Decimator | AgedSampler = Decimator(ratio)
         if gyro.jitter:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
-        self._converter = Converter(1.0 / gyro.sensitivity, gyro.word_bits, gyro.range, rounding=gyro.noise)
-        self._losses = stream("dropped")
+        self._converter = Converter(gyro.resolution, gyro.word_bits, gyro.full_scale(), rounding=gyro.noise)
+        self._losses, self._settled = stream("dropped"), False
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s], level, still and at T_0."""
@@ -179,8 +254,18 @@ class MemsGyroStage:
     def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]; NaN where one is lost."""
         sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
-        filtered = self._low_pass.process(sensed + self._noise.process(true_rate.size))
+        if self._gyro.rate_ramp:
+            sensed = sensed + self._ramp.process(true_rate.size)
+        if sensed.size and not self._settled:
+            # As it was before the record: in equilibrium with the rate that is on.
+            self._low_pass.settle(float(sensed[0]))
+            self._settled = True
+        filtered = self._low_pass.process(sensed)
+        if self._early:
+            filtered += self._noise.process(filtered.size)
         taken = self._decimator.process(self._fir.process(filtered))
+        if not self._early:
+            taken = taken + self._noise.process(taken.size)
         readings = self._converter.process(np.where(np.abs(taken) < self._gyro.dead_band, 0.0, taken))
         if self._gyro.noise and self._gyro.dropped:
             readings[self._losses.random(readings.size) < self._gyro.dropped] = np.nan

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -12,9 +13,11 @@ from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
 from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
+from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
-from testbed.sensors.noise_terms import NoiseStage, White
+from testbed.sensors.noise_terms import NoiseStage
+from testbed.sensors.sampled_noise import SampledNoise, Shape, sampled
 from testbed.signals import random_stream
 from testbed.units import Duration, Frequency, Quantity, ScaleFactor, Temperature, Voltage
 
@@ -63,7 +66,17 @@ class MhdArs(Sensor, ElectronicTerms):
         The converter spans plus and minus this [V].
     adc_bits : int
         Its word length, two's complement [-].
+
+    Notes
+    -----
+    Of the keys of data sheets it takes `output_rate` and `rate_noise_density`, one-sided, in place of `noise_density`,
+    which is two-sided; see `testbed.sensors.data_sheet`.
     """
+
+    words: ClassVar[tuple[Word, ...]] = (
+        OUTPUT_RATE,
+        replace(RATE_NOISE_DENSITY, field="noise_density", shown="nrad/s/sqrt(Hz)"),
+    )
 
     channel: MhdChannel
     temperature: Temperature = REFERENCE
@@ -154,7 +167,7 @@ class MhdArs(Sensor, ElectronicTerms):
         return [block for block in (self.anti_alias, delay) if block is not None]
 
     def start(self, input_rate_hz: float, seed: int, name: str) -> MhdArsStage:
-        """Return the sensor at rest; see `Sensor.start`."""
+        """Return the sensor in equilibrium with its first sample; see `Sensor.start`."""
         return MhdArsStage(self, input_rate_hz, seed, name)
 
 
@@ -165,9 +178,12 @@ class MhdArsStage:
         self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
-        self._johnson = NoiseStage(_johnson_terms(sensor, input_rate_hz, seed, name))
-        self._gain = sensor.channel_gain
-        self._analogue = _analogue_chain(sensor, input_rate_hz)
+        self._gain, self._first = sensor.channel_gain, np.nan
+        self._before, self._behind = _analogue_chain(sensor, input_rate_hz)
+        # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
+        self._early = sensor.saturation is not None
+        johnson = _johnson_terms(sensor, input_rate_hz if self._early else sensor.sample_rate, seed, name)
+        self._johnson = NoiseStage(johnson if sensor.noise else {})
         self._noise = NoiseStage(sensor.noise_terms(sensor.sample_rate, seed, name) if sensor.noise else {})
         self._converter = Converter(
             sensor.resolution, sensor.adc_bits, sensor.adc_range / sensor.scale_factor, rounding=sensor.noise
@@ -175,11 +191,19 @@ class MhdArsStage:
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
-        slip = self._channel.process(true_rate)
-        signal = self._gain * (slip + self._johnson.process(slip.size))
-        for stage in self._analogue:
+        if true_rate.size and np.isnan(self._first):
+            self._first = float(true_rate[0])
+        # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
+        signal = self._gain * self._channel.process(true_rate - self._first)
+        for stage in self._before:
+            signal = stage.process(signal)
+        if self._early:
+            signal = signal + self._johnson.process(signal.size)
+        for stage in self._behind:
             signal = stage.process(signal)
         taken = self._decimator.process(signal)
+        if not self._early:
+            taken = taken + self._johnson.process(taken.size)
         return self._converter.process(taken + self._noise.process(taken.size))
 
     def profile(self) -> FloatArray:
@@ -187,16 +211,24 @@ class MhdArsStage:
         return self._channel.profile()
 
 
-def _johnson_terms(sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> dict[str, NoiseTerm]:
-    density = sensor.johnson_noise if sensor.noise else 0.0
-    return {"johnson": White(density, input_rate_hz, random_stream(seed, name, "johnson"))} if density else {}
+def _johnson_terms(sensor: MhdArs, sample_rate_hz: float, seed: int, name: str) -> dict[str, NoiseTerm]:
+    """Return the Johnson noise behind the electronics, or in front of the rails if there are any."""
+    blocks = [*sensor.before_rails(), *([] if sensor.saturation else sensor.behind_rails())]
+    passed = LowPass(corner=sensor.amplifier_pole).rational()
+    for block in blocks:
+        passed = passed.through(block.rational())
+    shape = Shape(white=sensor.channel_gain * sensor.johnson_noise)
+    if not shape.white:
+        return {}
+    return {"johnson": SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, name, "johnson"))}
 
 
-def _analogue_chain(sensor: MhdArs, input_rate_hz: float) -> list[AnalogueStage]:
-    chain: list[AnalogueStage] = [OnePole(sensor.amplifier_pole, input_rate_hz)]
-    chain += [block.start(input_rate_hz) for block in sensor.before_rails()]
+def _analogue_chain(sensor: MhdArs, input_rate_hz: float) -> tuple[list[AnalogueStage], list[AnalogueStage]]:
+    """Return the stages up to the amplifier's rails, and the others."""
+    before: list[AnalogueStage] = [OnePole(sensor.amplifier_pole, input_rate_hz)]
+    before += [block.start(input_rate_hz) for block in sensor.before_rails()]
+    behind: list[AnalogueStage] = [block.start(input_rate_hz) for block in sensor.behind_rails()]
     if sensor.saturation is not None:
         limit = sensor.saturation.limit / sensor.scale_factor
-        chain.append(SaturationStage(limit, sensor.saturation.recovery_time, input_rate_hz))
-    chain += [block.start(input_rate_hz) for block in sensor.behind_rails()]
-    return chain
+        behind.insert(0, SaturationStage(limit, sensor.saturation.recovery_time, input_rate_hz))
+    return before, behind

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from testbed.parts import Part
 from testbed.sensors.analogue import DelayStage, LowPassStage
+from testbed.sensors.sampled_noise import Rational
 from testbed.signals import LinearFilter
 from testbed.units import Duration, Frequency, Quantity, Voltage
 
@@ -25,6 +26,9 @@ class Linear(Protocol):
 
     def response(self, freq_hz: FloatArray) -> ComplexArray:
         """Return output over input at `freq_hz` [Hz], shape (n_freq,) [-]."""
+
+    def rational(self) -> Rational:
+        """Return numerator and denominator in s [rad/s]; a delay's are 1, noise being no other later."""
 
     def start(self, sample_rate_hz: float) -> AnalogueStage:
         """Return the block at rest, for samples at `sample_rate_hz` [Hz]."""
@@ -54,6 +58,10 @@ class Transformer(Part):
         turn = 1j * freq_hz
         response: ComplexArray = turn / (turn + self.corner_freq_hz)
         return response
+
+    def rational(self) -> Rational:
+        """Return numerator and denominator in s [rad/s]."""
+        return Rational((1.0, 0.0), (1.0, 2.0 * np.pi * self.corner_freq_hz))
 
     def start(self, sample_rate_hz: float) -> LinearFilter:
         """Return the transformer at rest: exact for an input linear between samples, which errs on H - 1 only."""
@@ -86,6 +94,11 @@ class LowPass(Part):
         response: ComplexArray = np.prod(1.0 / (1.0 - s / self._poles()), axis=-1)
         return response
 
+    def rational(self) -> Rational:
+        """Return numerator and denominator in s [rad/s]."""
+        poles = 2.0 * np.pi * self.corner * self._poles()
+        return Rational((float(np.prod(-poles).real),), tuple(np.poly(poles).real))
+
     def start(self, sample_rate_hz: float) -> LowPassStage:
         """Return the filter at rest."""
         poles = self._poles()
@@ -113,6 +126,10 @@ class Delay(Part):
         """Return output over input at `freq_hz` [Hz], shape (n_freq,) [-]."""
         response: ComplexArray = np.exp(-2j * np.pi * freq_hz * self.time)
         return response
+
+    def rational(self) -> Rational:
+        """Return 1 over 1: noise that is late is the same noise."""
+        return Rational((1.0,), (1.0,))
 
     def start(self, sample_rate_hz: float) -> DelayStage:
         """Return the delay line, empty."""

@@ -12,8 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.parts import Part
-from testbed.sensors.noise_terms import NoiseStage, Quantization, Ramp, White, flicker, markov, random_walk
-from testbed.signals import random_stream
+from testbed.sensors.noise_terms import (
+    NoiseStage,
+    Quantization,
+    Ramp,
+    White,
+    continuous_flicker,
+    flicker,
+    markov,
+    random_walk,
+)
+from testbed.sensors.sampled_noise import Rational, SampledNoise, Shape, sampled
+from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import (
     AngularAcceleration,
     Frequency,
@@ -61,15 +71,16 @@ class GyroTerms(Part):
     markov_time: PositiveDuration = 100.0
     lowest_frequency: Frequency = 1e-4
 
-    def noise_psd(self, freq_hz: FloatArray, sample_rate_hz: float) -> FloatArray:
+    def noise_psd(self, freq_hz: FloatArray, sample_rate_hz: float | None = None) -> FloatArray:
         """Return the two-sided density of the sum of the random terms.
 
         Parameters
         ----------
         freq_hz : ndarray, shape (n_freq,)
             Frequency, above zero [Hz].
-        sample_rate_hz : float
-            Sample rate, which the quantisation depends on [Hz].
+        sample_rate_hz : float, optional
+            Sample rate, which the quantisation depends on [Hz]; without it that of continuous time, (2 pi f Q)^2 times
+            50 us.
 
         Returns
         -------
@@ -77,7 +88,10 @@ class GyroTerms(Part):
             S(f) [rad^2/s].
         """
         turn = 2.0 * np.pi * freq_hz
-        quantized = (2.0 * np.sin(0.5 * turn / sample_rate_hz) * self.quantization) ** 2 * sample_rate_hz
+        if sample_rate_hz is None:
+            quantized = (turn * self.quantization) ** 2 / BASE_RATE_HZ
+        else:
+            quantized = (2.0 * np.sin(0.5 * turn / sample_rate_hz) * self.quantization) ** 2 * sample_rate_hz
         pink = self.bias_instability**2 / (2.0 * np.pi * np.maximum(freq_hz, self.lowest_frequency))
         lagged = 2.0 * self.markov_bias**2 * self.markov_time / (1.0 + (turn * self.markov_time) ** 2)
         density: FloatArray = (
@@ -154,6 +168,45 @@ class GyroTerms(Part):
             source = stream("markov_bias")
             terms["markov_bias"] = markov(self.markov_bias, self.markov_time, sample_rate_hz, source)
         return terms
+
+    def shapes(self) -> dict[str, Shape]:
+        """Return the random terms that are not zero in continuous time, flicker up to 20 kHz, Q at steps of 50 us."""
+        shapes = {
+            "quantization": Shape(white=self.quantization / math.sqrt(BASE_RATE_HZ), slope=True),
+            "angle_random_walk": Shape(white=self.angle_random_walk),
+            "rate_random_walk": Shape(poles=(0.0,), gains=(self.rate_random_walk,)),
+            "markov_bias": Shape(
+                poles=(1.0 / self.markov_time,), gains=(self.markov_bias * math.sqrt(2.0 / self.markov_time),)
+            ),
+        }
+        if self.bias_instability:
+            poles, gains = continuous_flicker(self.lowest_frequency, BASE_RATE_HZ)
+            shapes["bias_instability"] = Shape(poles=tuple(poles), gains=tuple(self.bias_instability * gains))
+        return {name: shape for name, shape in shapes.items() if getattr(self, name)}
+
+    def sampled_terms(self, passed: Rational, sample_rate_hz: float, seed: int, *names: str) -> dict[str, NoiseTerm]:
+        """Return the random terms behind a low-pass, as its readings have them; the ramp is not among them.
+
+        Parameters
+        ----------
+        passed : Rational
+            The low-pass.
+        sample_rate_hz : float
+            Rate of the readings [Hz].
+        seed : int
+            Seed of the run.
+        *names : str
+            Owner of the streams, such as the sensor's name.
+
+        Returns
+        -------
+        dict of str to NoiseTerm
+            In the order of addition, each on the stream ``(*names, term, "sampled")``.
+        """
+        return {
+            term: SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, *names, term, "sampled"))
+            for term, shape in self.shapes().items()
+        }
 
 
 class GyroNoise(GyroTerms):

@@ -29,15 +29,14 @@ class NoiseTerm(Protocol):
         """Return the next `n_time` samples [rad/s]."""
 
 
-@njit(cache=True)
+# Free to add the sections in any order, which is the same one for every sample.
+@njit(cache=True, fastmath={"reassoc", "nsz"})
 def _run_bank(v, p, g, w, y):  # type: ignore[no-untyped-def] # pragma: no cover
     """v_i <- p_i v_i + g_i w; y = sum of v_i."""
     for k in range(w.size):
-        drive = w[k]
+        drive, total = w[k], 0.0
         for i in range(v.size):
             v[i] = p[i] * v[i] + g[i] * drive
-        total = 0.0
-        for i in range(v.size):
             total += v[i]
         y[k] = total
 
@@ -122,38 +121,77 @@ def _stationary_root(decay: FloatArray, gain: FloatArray) -> FloatArray:
     return root
 
 
-@functools.lru_cache(maxsize=32)
-def _one_over_f(relative_band: float) -> tuple[FloatArray, FloatArray]:
-    r"""Return decays and gains of sections whose |H|^2 is 1 / (2 pi f T) from f T = `relative_band` to 1/2.
+def _zolotarev(kappa: float) -> FloatArray:
+    r"""Return poles and zeros of the best rational approximation of x^-1/2 on [1, kappa^-2] [1]_.
 
-    In x = |1 - z|^2 = 4 sin^2(pi f T) a section pair is a real rational factor, so Zolotarev's best rational
-    approximation of x^-1/2 [1]_ gives poles and zeros in closed form, interlaced on the negative axis:
-    c_l = sinh^2(l K' / 2m), K' = ln(4 / kappa), mirrored about the middle of the band (exact to
-    order kappa, the relative band).
+    Zolotarev's are known in closed form and interlaced on the negative axis: -x_l with x_l = sinh^2(l K' / 2m),
+    K' = ln(4 / kappa), mirrored about the middle of the band (exact to order kappa); the even ones are the poles.
+
+    Parameters
+    ----------
+    kappa : float
+        Lower over upper frequency of the band, x being the square of a frequency [-].
+
+    Returns
+    -------
+    ndarray, shape (2 m - 1,)
+        x_l, ascending [-].
 
     References
     ----------
     .. [1] van den Eshof, Frommer, Lippert, Schilling, van der Vorst, "Numerical methods for the QCD
        overlap operator. I", Comput. Phys. Commun. 146 (2002).
     """
-    low = 2.0 * math.sin(math.pi * relative_band)
-    kappa = low / 2.0
     quarter = math.log(4.0 / kappa)
     m = math.ceil(quarter * math.log(4.0 / _RIPPLE) / math.pi**2)
     lower = np.sinh(np.arange(1, m) * quarter / (2 * m)) ** 2
-    c = low**2 * np.concatenate([lower, [1.0 / kappa], 1.0 / (kappa**2 * lower[::-1])])
+    return np.concatenate([lower, [1.0 / kappa], 1.0 / (kappa**2 * lower[::-1])])
+
+
+@functools.lru_cache(maxsize=32)
+def continuous_flicker(lowest_freq_hz: float, highest_freq_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return poles and gains of sections in parallel, sum g_i / (s + p_i), whose |H|^2 is 1 / (2 pi f) over a band.
+
+    Parameters
+    ----------
+    lowest_freq_hz, highest_freq_hz : float
+        The band; flat below, falling by 1 / f^2 above [Hz].
+
+    Returns
+    -------
+    ndarray, shapes (n_section,), (n_section,)
+        p_i [rad/s] and g_i [sqrt(rad/s)].
+    """
+    low = 2.0 * np.pi * lowest_freq_hz
+    roots = low * np.sqrt(_zolotarev(lowest_freq_hz / highest_freq_hz))
+    poles, zeros = roots[0::2], roots[1::2]
+    gain = _residues(zeros, poles)
+    turn = np.geomspace(low, 2.0 * np.pi * highest_freq_hz, 40 * poles.size)
+    level = turn * np.abs((gain / (1j * turn[:, None] + poles)).sum(axis=1)) ** 2
+    return poles, gain / (level.max() * level.min()) ** 0.25
+
+
+@functools.lru_cache(maxsize=32)
+def _one_over_f(relative_band: float) -> tuple[FloatArray, FloatArray]:
+    """Return decays and gains of sections whose |H|^2 is 1 / (2 pi f T) from f T = `relative_band` to 1/2: in
+    x = |1 - z|^2 = 4 sin^2(pi f T), of which a section pair is a real rational factor, the best approximation of
+    x^-1/2.
+    """
+    c = _zolotarev(math.sin(math.pi * relative_band)) * (2.0 * math.sin(math.pi * relative_band)) ** 2
     # (1 - p)^2 / p = c, solved for 1 - p.
     decay = np.sqrt(c + c**2 / 4.0) - c / 2.0
     poles = np.concatenate([decay[0::2], 1.0 - np.array(_BEND_POLES)])
     zeros = np.concatenate([decay[1::2], 1.0 - np.array(_BEND_ZEROS)])
     gain = _residues(zeros, poles)
-    freq = np.geomspace(relative_band, 0.5, 40 * m)
+    freq = np.geomspace(relative_band, 0.5, 40 * decay.size)
     level = 2.0 * np.pi * freq * np.abs(bank_response(poles, gain, freq)) ** 2
     return poles, gain / (level.max() * level.min()) ** 0.25
 
 
 def _residues(zeros: FloatArray, poles: FloatArray) -> FloatArray:
-    """Return g_i of sum g_i / (1 - p_i/z) = prod (1 - q_j/z) / prod (1 - p_i/z), roots given as 1 - root."""
+    """Return g_i of sum g_i / (1 - p_i/z) = prod (1 - q_j/z) / prod (1 - p_i/z), roots given as 1 - root; also of
+    sum g_i / (s + p_i) = prod (s + q_j) / prod (s + p_i), roots given as -root.
+    """
     numerator = np.prod(zeros[None, :] - poles[:, None], axis=1)
     difference = poles[None, :] - poles[:, None]
     np.fill_diagonal(difference, 1.0)

@@ -9,7 +9,8 @@ import pytest
 
 import testbed
 from testbed.chain.pipeline import _sense
-from testbed.cli.terminal import print_metrics, print_scenario
+from testbed.cli.terminal import print_metrics
+from testbed.cli.understood import print_scenario
 from testbed.errors import ScenarioError
 from testbed.judging.table_facts import table_facts
 from testbed.report.digest import _bridged

@@ -78,6 +78,7 @@ def test_filters_know_readings_and_belief_only(tmp_path):
         "kalman",
         {name: group.rate for name, group in run.sensors.items()},
         sample_rate_hz={"mhd_ars": 20_000.0, "mems_gyro": 2_000.0},
+        start="rest",
     )
     assert np.array_equal(est.rate, run.fusion["kalman"].rate)
 

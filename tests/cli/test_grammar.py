@@ -73,7 +73,7 @@ def test_every_summary_is_one_finished_sentence(kind, name):
 def test_list_says_the_whole_summary_on_a_narrow_terminal(monkeypatch, capsys):
     from rich.console import Console
 
-    monkeypatch.setattr("testbed.cli.terminal._console", lambda: Console(width=60))
+    monkeypatch.setattr("testbed.cli.catalogue.terminal", lambda: Console(width=60))
     _, narrow, _ = say("list", monkeypatch=monkeypatch, capsys=capsys)
     assert max(map(len, narrow.splitlines())) <= 60
     words = " ".join(narrow.split())
@@ -134,6 +134,18 @@ def test_quiet_says_nothing_but_errors(tmp_path, monkeypatch, spoken):
     status, out, err = spoken("check", "missing.yaml", "--quiet")
     assert (status, out) == (2, "")
     assert "missing.yaml" in err
+
+
+def test_a_path_may_hold_what_elsewhere_is_markup(tmp_path, monkeypatch, spoken):
+    folder = tmp_path / "b[/red]"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    short_file(folder)
+    assert spoken("check", folder / "short.yaml")[0] == 0
+    status, out, _ = spoken("run", "short.yaml", "--out", folder / "[bold]out")
+    assert (status, f"wrote {folder / '[bold]out'}: " in out) == (0, True)
+    status, out, _ = spoken("allan", folder / "[bold]out", "--out", "[blue].svg")
+    assert (status, "wrote [blue].svg" in out) == (0, True)
 
 
 def test_check_says_each_key_as_written_and_in_si(tmp_path, spoken):

@@ -28,9 +28,15 @@ def readings():
     return rate, readings_of(rate, 1)
 
 
+def from_rest(name, spoilt):
+    """Return the estimate of a filter that knows, where it can, that the record begins at rest."""
+    known = {"start": "rest"} if "start" in METHODS[name].Parameters.model_fields else {}
+    return estimate(named(name), spoilt, sample_rate_hz=RATES, **known)
+
+
 @functools.cache
 def fault_free(name):
-    return estimate(named(name), readings()[1], sample_rate_hz=RATES)
+    return from_rest(name, readings()[1])
 
 
 def every_second(z, a, b, full_scale):
@@ -91,7 +97,7 @@ def estimate_with(fault, name, sensor, begin=BEGIN):
     a, b = round(begin * RATES[sensor]), round((begin + END - BEGIN) * RATES[sensor])
     fault(spoilt[sensor], a, b, FULL_SCALE[sensor])
     given = spoilt[sensor][np.isfinite(spoilt[sensor])] - readings()[1][sensor][np.isfinite(spoilt[sensor])]
-    return estimate(named(name), spoilt, sample_rate_hz=RATES), np.abs(given).max()
+    return from_rest(name, spoilt), np.abs(given).max()
 
 
 def check_sane(block):

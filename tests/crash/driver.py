@@ -30,7 +30,7 @@ from testbed.drift.records import Columns
 from testbed.drift.session import read_model, train_model
 from testbed.errors import RunError, ScenarioError
 from testbed.report import write_report
-from testbed.runs.folder import failing_as_run_error, open_run
+from testbed.runs.folder import failing_as_run_error
 from testbed.runs.manifest import read_manifest, strangers
 from tests.scenes import short
 
@@ -61,7 +61,7 @@ class Scene:
     def training(self, number):
         source = self.folder / ("up.csv" if number % 2 else "down.csv")
         columns = Columns(temperature_unit="K", sample_rate="0.1 Hz")
-        list(train_model([source], columns, "gradient", self.model))
+        train_model([source], columns, "gradient", self.model, lambda _: None)
 
     def faults(self):
         """Yield what is not whole, or is not what its name says."""
@@ -77,7 +77,7 @@ class Scene:
             yield f"leftovers that were not swept: {left}"
 
     def _faults_of_run(self):
-        run, manifest = open_run(self.place), read_manifest(self.place)
+        run, manifest = testbed.open_run(self.place), read_manifest(self.place)
         yield from strangers(self.place)
         yield from (f"{name} is missing" for name in manifest["files"] if not (self.place / name).is_file())
         with h5py.File(self.place / "run.nc") as file:

@@ -108,11 +108,6 @@ def test_two_gyros_are_possible() -> None:
     assert model.R[1] == pytest.approx(2.0 * model.R[0], rel=1e-12, abs=0.0)
 
 
-def test_start_is_wide_for_the_signal_and_narrow_for_the_sensors() -> None:
-    P0 = np.degrees(1.0) ** 2 * np.diag(build_model(default_belief(), RATES, order=2, q=1.0).P0)
-    np.testing.assert_allclose(P0, [1.0, (2 * np.pi * 100.0 * 1e-2) ** 2, 1e-4, 1e-4, 1e-4, 1e-4], rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("rates", "message"),
     [

@@ -7,7 +7,8 @@ import pytest
 
 import testbed
 from testbed.chain.pipeline import simulate
-from testbed.cli.terminal import print_metrics, print_scenario
+from testbed.cli.terminal import print_metrics
+from testbed.cli.understood import print_scenario
 from testbed.judging.judge import Judge
 from testbed.judging.table_facts import TableMetrics, table_facts, truth_noise
 from testbed.models.motion import CommandBlock

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BLOCK = re.compile(r"^```(sh|python|html)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-EDIT = re.compile(r"^(?:#|<!--) (\S+), (above|below): (.*?)(?: -->)?\n", re.MULTILINE)
+BLOCK = re.compile(r"^```(sh|python|yaml|html)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+EDIT = re.compile(r"^(?:#|<!--) (\S+), (?:(above|below): (.*?)|new)(?: -->)?\n", re.MULTILINE)
 
 
 def recipes() -> dict[str, list[tuple[str, str]]]:
@@ -33,8 +33,11 @@ def copy_of_the_project(folder: Path) -> Path:
 
 
 def edit(project: Path, text: str) -> None:
-    """Insert a block above or below the one line that begins with what its first line names."""
+    """Write a block where its first line says: into a new file, or above or below the one line that begins so."""
     path, place, anchor = EDIT.match(text).groups()
+    if place is None:
+        (project / path).write_text(EDIT.sub("", text, count=1), encoding="utf-8")
+        return
     lines = (project / path).read_text(encoding="utf-8").split("\n")
     (at,) = [i for i, line in enumerate(lines) if line.strip().startswith(anchor)]
     at += place == "below"

@@ -89,7 +89,7 @@ def test_no_terminal_cuts_a_number(
 ) -> None:
     """Lines are left to the report where they do not fit, also behind a long name."""
     row = run[0]["fusion"]["complementary"]
-    monkeypatch.setattr("testbed.cli.terminal._console", lambda: Console(width=width))
+    monkeypatch.setattr("testbed.cli.terminal.terminal", lambda: Console(width=width))
     fusion = {"complementary": row, "a_long_filter_name": row}
     print_metrics(RunMetrics.model_validate({**run[0], "fusion": fusion}), tmp_path)
     text = capsys.readouterr().out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import statistics
+
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
@@ -202,10 +204,10 @@ def test_a_gyro_of_another_bandwidth_costs_little_with_its_own_belief(tmp_path):
         .replace("kalman: {}", "kalman: {}\n  shakf: {}")
     )
     (tmp_path / "mixed.yaml").write_text(mixed, encoding="utf-8")
-    errors = {
-        name: row["rmse_deg_s"]
-        for name, row in testbed.run(load_scenario(tmp_path / "mixed.yaml")).metrics["fusion"].items()
-    }
+    scenario = load_scenario(tmp_path / "mixed.yaml")
+    # Most of the error is the gyro's slow noise over the window: one seed tells little, the median of five does.
+    runs = [testbed.run(scenario, seed=seed).metrics["fusion"] for seed in range(5)]
+    errors = {name: statistics.median(run[name]["rmse_deg_s"] for run in runs) for name in runs[0]}
     assert set(errors) == {"kalman", "shakf", "arw_shakf"}
     assert max(errors.values()) <= 0.0035, errors
 

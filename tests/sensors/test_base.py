@@ -39,9 +39,12 @@ def test_unknown_preset_gives_the_nearest() -> None:
 @pytest.mark.parametrize("freq", [1.0, 10.0, 100.0, 900.0])
 def test_noise_off_equals_the_response(name: str, freq: float) -> None:
     sensor = load_preset(name).model_copy(update={"noise": False})
+    if (2.0 * freq / sensor.sample_rate).is_integer():
+        pytest.skip("half the sample rate, where a sine has no phase")
     settle, periods = 4.0, max(round(freq), 1)
     t = np.arange(round(20000.0 * (settle + periods / freq))) / 20000.0
-    readings = sensor.sample(0.1 * np.cos(2.0 * np.pi * freq * t), 20000.0)
+    # A sine begins at its mean, with which the sensor is in equilibrium.
+    readings = sensor.sample(0.1 * np.sin(2.0 * np.pi * freq * t), 20000.0)
     tail = readings[round(sensor.sample_rate * settle) :]
     t_tail = settle + np.arange(tail.size) / sensor.sample_rate
     basis = np.stack(
@@ -52,7 +55,7 @@ def test_noise_off_equals_the_response(name: str, freq: float) -> None:
     # (0.01 at 900 Hz); four seconds leave e^-60 of the MHD channel's start and 1e-4 of the filtered gyro's slow pole
     # (zero at 0.1 rad/s almost on it).
     hold = (np.pi * freq / 20000.0) ** 2 / 2.0
-    assert abs((a - 1j * b) / 0.1 - sensor.response(np.array([freq]))[0]) < hold + 1e-3 * 0.1 + 1e-6
+    assert abs((b + 1j * a) / 0.1 - sensor.response(np.array([freq]))[0]) < hold + 1e-3 * 0.1 + 1e-6
 
 
 @pytest.mark.contract

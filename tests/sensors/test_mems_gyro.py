@@ -57,8 +57,8 @@ def test_noise_passes_the_low_pass(name: str) -> None:
         band = slice(low, high)
         images = np.arange(-5, 5)[:, None] * 2000.0
         folded = np.abs(freq[band] + images)
-        # Everything that the reading clock folds in: |H|^2 sinc^4 (the straight line between samples) at each image.
-        power = np.abs(sensor.response(folded.ravel()).reshape(folded.shape)) ** 2 * np.sinc(folded / 20000.0) ** 4
+        # Everything that the reading clock folds in: |H|^2 at each image.
+        power = np.abs(sensor.response(folded.ravel()).reshape(folded.shape)) ** 2
         density = sensor.angle_random_walk**2 * power.sum(axis=0) + (1.0 / sensor.sensitivity) ** 2 / 12.0 / 2000.0
         # 100 s in 1 s segments, half overlapped, Hann: at least 100 values per line of which neighbours share; 5 sigma.
         bound = 5.0 / np.sqrt(100.0 * (high - low) / 2.0)

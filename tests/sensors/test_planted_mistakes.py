@@ -47,6 +47,7 @@ from testbed.allan import allan_deviation
 from testbed.allan import curve as allan
 from testbed.allan.freedom import equivalent_freedom
 from testbed.sensors import base, load_preset, mems_gyro, noise, noise_terms
+from testbed.sensors.sampled_noise import sampled
 from testbed.signals import LinearFilter, random_stream
 
 if TYPE_CHECKING:
@@ -358,6 +359,10 @@ def plant_noise_per_step(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(noise, "White", lambda n, fs, stream: noise_terms.White(n * math.sqrt(2000.0 / fs), fs, stream))
 
 
+def plant_noise_of_another_rate(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(noise, "sampled", lambda shape, passed, fs: sampled(shape, passed, 10.0 * fs))
+
+
 def plant_one_sided_density(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(noise, "White", lambda n, fs, stream: noise_terms.White(n / math.sqrt(2.0), fs, stream))
 
@@ -464,9 +469,9 @@ def plant_input_written(patch: pytest.MonkeyPatch) -> None:
 def plant_density_changed_in_place(patch: pytest.MonkeyPatch) -> None:
     original = noise.GyroTerms.noise_psd
 
-    def noise_psd(self: Any, freq_hz: FloatArray, sample_rate_hz: float) -> FloatArray:
+    def noise_psd(self: Any, freq_hz: FloatArray, *sample_rate_hz: float) -> FloatArray:
         freq_hz *= 1.0
-        return original(self, freq_hz, sample_rate_hz)
+        return original(self, freq_hz, *sample_rate_hz)
 
     patch.setattr(noise.GyroTerms, "noise_psd", noise_psd)
 
@@ -540,7 +545,7 @@ PLANTS: list[tuple[Callable[[pytest.MonkeyPatch], None], Callable[[], None]]] = 
     (plant_walk_stepped_with_dt, check_rate_random_walk),
     (plant_white_random_walk, check_rate_random_walk),
     (plant_noise_per_step, check_angle_random_walk),
-    (plant_noise_per_step, check_rate_of_the_task),
+    (plant_noise_of_another_rate, check_rate_of_the_task),
     (plant_one_sided_density, check_angle_random_walk),
     (plant_one_sided_density, check_white),
     (plant_one_sided_flicker, check_bias_instability),

@@ -24,7 +24,7 @@ def allan(
     max_tau: Annotated[str | None, typer.Option(metavar="TIME", help="Longest averaging time of the fit.")] = None,
 ) -> None:
     """Print the Allan coefficients of recorded rates or of a run's sensors, and draw the deviation."""
-    from testbed.cli.terminal import print_allan
+    from testbed.cli.allan import print_allan
     from testbed.judging.allan_analysis import allan_figure, analyse, figure_format, write_figure
     from testbed.judging.allan_records import read
     from testbed.judging.allan_words import write_imu

@@ -27,7 +27,7 @@ def reproduce(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for tables and figures; default runs/<paper>.")] = None,
 ) -> None:
-    """Repeat the measurements of a paper and print its numbers beside ours."""
+    """Repeat the measurements of paper1, paper2 or paper3 and print its numbers beside ours."""
     folder = out or Path("runs") / paper
     for line in run_paper(paper, seeds, folder):
         output.say(line)

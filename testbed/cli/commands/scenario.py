@@ -28,11 +28,13 @@ def run(
     """Run a scenario, print its errors and write the run folder."""
     from testbed.chain.runner import run as run_scenario
     from testbed.cli.terminal import print_metrics
+    from testbed.cli.understood import doubts
     from testbed.logs.options import quantity
     from testbed.scenario.loader import load_scenario
 
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+    output.warn(doubts(loaded))
     target = out or Path("runs") / loaded.name
     with output.progress(loaded.name, loaded.frame.duration) as tick:
         result = run_scenario(loaded, out=target, seed=seed, block=length, progress=tick)
@@ -51,12 +53,12 @@ def check(
     scenario: ScenarioFile, output: Output, plugin: PluginModules = None, allow_outside: AllowOutside = False
 ) -> None:
     """Validate a scenario and print what was understood."""
-    from testbed.cli.terminal import print_scenario
-    from testbed.cli.understood import scenario_document
+    from testbed.cli.understood import doubts, print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+    output.warn(doubts(loaded))
     facts = table_facts(loaded)
     output.show(scenario_document(loaded, facts), lambda: print_scenario(loaded, facts))
 

@@ -136,7 +136,6 @@ class Shakf(SageHusa):
     blames_the_other = "R of the gyro takes what a railed MHD sensor did for noise, and falls back slowly"
     # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to
     # 25 times too small.
-    departs: ClassVar[Mapping[str, tuple[float, float]]] = {"nees": (100.0, 600.0), "nis_mhd_ars": (0.6, 0.9)}
     dishonest = (
         "R follows the lag, P follows R through a gain that no longer fits: the paper's failure, kept to show it"
     )

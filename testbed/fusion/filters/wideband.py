@@ -39,13 +39,10 @@ class WidebandParameters(FormParameters):
     restart : float
         A filter slower than the most likely one, and by the factor exp(-restart) less likely, starts again from that
         one's state.
-    gate : float
-        A reading is refused if even the filter least surprised by it finds it that many standard deviations off.
+    surprise : float
+        A reading is refused if the mixture finds it that many standard deviations off.
     patience : int
         Readings that the gate may refuse in a row: what lasts longer is taken for the signal.
-    stuck_after : int
-        A sensor that repeats its reading exactly that often is taken for stuck and not read until it changes; 0 is
-        never.
     """
 
     default_q: ClassVar[dict[int, float]] = {3: 1e4 * DEG**2}
@@ -55,9 +52,8 @@ class WidebandParameters(FormParameters):
     filters: Annotated[int, Field(ge=2, le=32)] = 16
     memory: PositiveDuration = 0.05
     restart: Annotated[float, Field(gt=0.0)] = 20.0
-    gate: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
+    surprise: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
     patience: Annotated[int, Field(ge=0)] = 10
-    stuck_after: Annotated[int, Field(ge=0)] = 10
 
 
 class Wideband(ModelFilter):
@@ -69,9 +65,9 @@ class Wideband(ModelFilter):
     with e_i the innovation of filter i, C_i its variance and :math:`\lambda = e^{-T/\mathrm{memory}}`. The filters run
     side by side and differ in how fast a signal they expect. One that is too slow for the signal spoils its slow
     states, which take half a minute to recover: it is given state and covariance of the best filter until it does
-    better. A square beyond gate^2 counts by its logarithm. No band, no threshold on the signal. Refused readings
-    (spike, stuck) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the weighted mean
-    of log10 q [rad^2/s^(2m+1)].
+    better. A square beyond that of `surprise` counts by its logarithm. No band, no threshold on the signal.
+    Refused readings (spikes) are treated as missing; the diagnostic `refused_<sensor>` counts them, `log10_q` is the
+    weighted mean of log10 q [rad^2/s^(2m+1)].
 
     Parameters
     ----------
@@ -100,14 +96,12 @@ class Wideband(ModelFilter):
         self._R = self.measurement_noise("R", {}, explicit=False)
         self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
         self._levels = np.log10(q)
-        self._x = np.zeros((self._x.size, q.size))
+        self._x = np.repeat(self._x[:, None], q.size, axis=1)
         self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
         self._score = np.zeros(q.size)
-        self._watch = np.tile([np.nan, 0.0, 0.0, 0.0], (self._R.size, 1))
+        self._watch = np.zeros((self._R.size, 2))
         forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
-        self._setting = np.array(
-            [0.0, forget, parameters.gate, parameters.patience, parameters.stuck_after, parameters.restart]
-        )
+        self._setting = np.array([0.0, forget, parameters.surprise, parameters.patience, parameters.restart])
         self._columns = _columns(self.model.F), _columns(self.model.H)
         self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form)
 
@@ -119,8 +113,17 @@ class Wideband(ModelFilter):
         q: FloatArray,
     ) -> FloatArray:
         """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
-        order, use = parameters.order, parameters.use_input_noise
-        models = [build_model(belief, sample_rate_hz, order=order, q=float(one), use_input_noise=use) for one in q]
+        models = [
+            build_model(
+                belief,
+                sample_rate_hz,
+                order=parameters.order,
+                q=float(one),
+                use_input_noise=parameters.use_input_noise,
+                coloured=parameters.coloured,
+            )
+            for one in q
+        ]
         return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:

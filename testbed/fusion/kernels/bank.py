@@ -257,22 +257,15 @@ def update_root_bank(x, D, R, e, spread, g, total, n, M):  # noqa: PLR0912  # pr
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def admit(watch, z, smallest, gate, patience, stuck_after):  # pragma: no cover
-    """Return whether a reading is to be used; `watch` = [last reading, equal ones before it, refused in a row, refused
-    so far].
+def admit(watch, surprise, gate, patience):  # pragma: no cover
+    """Return whether a reading is to be used; `watch` = [refused in a row, refused so far].
 
-    `smallest` is its innovation over the standard deviation, in the filter that finds it least surprising.
+    `surprise` is its innovation over the standard deviation, in the mixture: the fastest filter admits anything.
     """
-    watch[1] = watch[1] + 1.0 if z == watch[0] else 0.0
-    watch[0] = z
-    stuck = stuck_after > 0 and watch[1] >= stuck_after
-    if smallest <= gate:
-        watch[2] = 0.0
-    else:
-        watch[2] += 1.0
+    watch[0] = watch[0] + 1.0 if surprise > gate else 0.0
     # A signal that truly jumped stays outside the gate; a spike does not.
-    if stuck or 0.0 < watch[2] <= patience:
-        watch[3] += 1.0
+    if 0.0 < watch[0] <= patience:
+        watch[1] += 1.0
         return False
     return True
 
@@ -328,8 +321,8 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
 
     They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots.
     `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the columns of F and H that are not zero, their number last.
-    `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 4) as in `admit`, `setting` = [started,
-    forget, gate, patience, stuck_after, restart], `levels` (M,) what the weights average into the row LEVEL.
+    `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 2) as in `admit`, `setting` = [started,
+    forget, gate, patience, restart], `levels` (M,) what the weights average into the row LEVEL.
     """
 
     @njit(cache=True, error_model="numpy")
@@ -340,7 +333,7 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
         e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
         used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
-        forget, gate, patience, stuck_after = setting[1], setting[2], setting[3], setting[4]
+        forget, gate, patience = setting[1], setting[2], setting[3]
         weigh(score, weight, M)
         for k in range(Z.shape[1]):
             if setting[0] > 0.0:
@@ -359,18 +352,17 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
                         innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
                     else:
                         innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
-                    mean, smallest = 0.0, np.inf
+                    mean = 0.0
                     for m in range(M):
                         mean += weight[m] * e[m]
-                        smallest = min(smallest, abs(e[m]) / np.sqrt(spread[m] + R[i]))
                     variance = R[i]
                     for m in range(M):
                         variance += weight[m] * (spread[m] + (e[m] - mean) ** 2)
                     out[row + INNOVATION, k] = mean
                     out[row + INNOVATION_VARIANCE, k] = variance
-                    used[i] = admit(watch[i], Z[i, k], smallest, gate, patience, stuck_after)
+                    used[i] = admit(watch[i], abs(mean) / np.sqrt(variance), gate, patience)
                     informed = informed or used[i]
-                out[row + REFUSED, k] = watch[i, 3]
+                out[row + REFUSED, k] = watch[i, 1]
             if informed:
                 setting[0] = 1.0
                 for m in range(M):
@@ -390,7 +382,7 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
                         else:
                             update_plain_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
                 weigh(score, weight, M)
-                start_again(x, P, score, setting[5], n, M)
+                start_again(x, P, score, setting[4], n, M)
             rate, variance, level = 0.0, 0.0, 0.0
             for m in range(M):
                 rate += weight[m] * x[0, m]

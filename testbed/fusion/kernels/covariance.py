@@ -1,6 +1,6 @@
 """The compiled steps of the filters with one covariance, for sizes known to the compiler.
 
-`kalman_kernel`, `fixed_gain_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
+`kalman_kernel`, `settling_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
 sensors): loops of constant length unroll. They close over integers only, which numba's disk cache keys by value, so
 that a second process loads and does not compile. That cache watches no other file than the kernel's own: what calls
 each other stays in one file, which is why this one is long. `testbed.fusion.kernels.bank` and
@@ -34,6 +34,11 @@ INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
 # row: what lasts longer is the signal. So wide that the lag behind a fast signal stays inside, and a spike inside does
 # no harm that lasts.
 GATE, PATIENCE = 1000.0, 10
+# Entries of `progress` of `settling_kernel`, its modes, and the relative change of a gain between two checks that ends
+# the recursion.
+STARTED, STEP, MODE, SINCE, KEPT, EVERY, COUNTS = range(7)
+RECURSION, KEEPING, SETTLED = range(3)
+SETTLED_CHANGE = 1e-3
 # Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
 Q_RATE, GUARD_HITS, ADAPTIVE_HEADER_ROWS = 2, 3, 4
 R_USED, INCREMENTS, BAND, INFLATION, ADAPTIVE_ROWS = 2, 3, 4, 5, 6
@@ -428,53 +433,103 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PL
     return run
 
 
-@functools.lru_cache
-def fixed_gain_kernel(n: int, n_sensor: int) -> Any:
-    """Return run(x, P, F, Q, H, K, C, settled, Z, progress, out), a filter of settled gains over a block.
+@njit(cache=True, forceinline=True, error_model="numpy")
+def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
+    """Return whether an element of the gains has changed by more than `share` of itself, and keep them in `before`."""
+    changing = False
+    for j in range(n):
+        for i in range(n_sensor):
+            changing = changing or not abs(K[j, i] - before[j, i]) <= share * abs(K[j, i])
+            before[j, i] = K[j, i]
+    return changing
 
-    K (n_step, n, n_sensor), C (n_step, n_sensor), the variance of an innovation, and `settled` (n_step, n, n), the
-    covariance after the readings, repeat; `progress` = [started, step], then one count per sensor as in `outside_gate`.
-    P follows `settled` while readings come, and grows by F P F' + Q while none does. `out` as in `kalman_kernel`.
+
+@functools.lru_cache
+def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, Q, H, R, Z, cycle, progress, out), the Kalman filter until its gains have settled, then with
+    those.
+
+    `cycle` = (K, C, settled, before): gains (n_step, n, n_sensor), variance of an innovation (n_step, n_sensor) and
+    covariance after the readings (n_step, n, n) of each step of the cycle in which the readings repeat, and the gains
+    (n, n_sensor) that the next check compares with. `progress` = [started, step, mode, steps since the last check,
+    steps of the cycle kept, steps between checks], then one count per sensor as in `outside_gate`. A reading that is
+    due and missing ends the settled state: the recursion goes on from its covariance. `out` as in `kalman_kernel`.
     """
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, K, C, settled, Z, progress, out):  # pragma: no cover
-        x, moved, e = np.empty(n), np.empty(n), np.empty(n_sensor)
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, cycle, progress, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H = np.empty((n_sensor, n))
+        H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
+        K, C_settled, settled, before = cycle
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        now = np.zeros((n, n_sensor))
         for k in range(Z.shape[1]):
-            read, started = False, progress[0] > 0
-            if started:
+            step = progress[STEP]
+            if progress[STARTED] > 0:
                 move(x, F, moved, n)
-            for i in range(n_sensor):
-                row = HEADER_ROWS + INNOVATION_ROWS * i
-                e[i] = np.nan
-                if np.isfinite(Z[i, k]):
-                    e[i] = Z[i, k]
+            if progress[MODE] == SETTLED:
+                whole = True
+                for i in range(n_sensor):
+                    e[i], C[i] = Z[i, k], C_settled[step, i]
                     for j in range(n):
                         e[i] -= H[i, j] * x[j]
-                    # The gains are settled from the start, but what is known of the first reading is not.
-                    known = C[progress[1], i] if started else innovation(x, P, H, i, Z[i, k], n)[1]
-                    progress[2 + i] = outside_gate(progress[2 + i], e[i], known)
-                    if 0 < progress[2 + i] <= PATIENCE:
-                        e[i] = np.nan
-                    else:
-                        read = True
-                out[row + INNOVATION, k] = e[i]
-                out[row + INNOVATION_VARIANCE, k] = C[progress[1], i] if np.isfinite(e[i]) else np.nan
+                    whole = whole and not np.isinf(Z[i, k]) and not e[i] * e[i] > GATE * GATE * C[i]
+                if not whole:
+                    progress[MODE] = RECURSION
+                    P[:] = settled[step - 1]
+            read = progress[MODE] == SETTLED
+            if progress[MODE] != SETTLED:
+                if progress[STARTED] > 0:
+                    grow(P, F, Q, work, n)
+                for i in range(n_sensor):
+                    e[i] = np.nan
+                    if np.isfinite(Z[i, k]):
+                        e[i], spread = innovation(x, P, H, i, Z[i, k], n)
+                        C[i] = spread + R[i]
+                        progress[COUNTS + i] = outside_gate(progress[COUNTS + i], e[i], C[i])
+                        if 0 < progress[COUNTS + i] <= PATIENCE:
+                            e[i] = np.nan
+                        read = read or np.isfinite(e[i])
+                    # Whatever is missing begins the wait for settled gains anew.
+                    if np.isinf(Z[i, k]) or (np.isfinite(Z[i, k]) and np.isnan(e[i])):
+                        progress[MODE], progress[SINCE], before[:] = RECURSION, 0, 0.0
             for i in range(n_sensor):
-                if np.isfinite(e[i]):
+                row = HEADER_ROWS + INNOVATION_ROWS * i
+                out[row + INNOVATION, k] = e[i]
+                out[row + INNOVATION_VARIANCE, k] = C[i] if np.isfinite(e[i]) else np.nan
+                for j in range(n):
+                    now[j, i] = 0.0
+                if not np.isfinite(e[i]):
+                    continue
+                if progress[MODE] == SETTLED:
+                    left = Z[i, k]
                     for j in range(n):
-                        x[j] += K[progress[1], j, i] * e[i]
+                        left -= H[i, j] * x[j]
+                    for j in range(n):
+                        x[j] += K[step, j, i] * left
+                else:
+                    update(x, P, H, i, Z[i, k], R[i], g, gain, n)
+                    for j in range(n):
+                        now[j, i] = gain[j]
             if read:
-                progress[0] = 1
-                P[:] = settled[progress[1]]
-            elif started:
-                grow(P, F, Q, work, n)
-            progress[1] = (progress[1] + 1) % len(K)
+                progress[STARTED] = 1
             out[RATE, k] = x[0]
-            out[STD, k] = np.sqrt(P[0, 0])
+            out[STD, k] = np.sqrt(settled[step, 0, 0] if progress[MODE] == SETTLED else P[0, 0])
+            if progress[MODE] == RECURSION and progress[STARTED] > 0:
+                progress[SINCE] += 1
+                if step == 0 and progress[SINCE] > progress[EVERY]:
+                    progress[SINCE] = 0
+                    if not still_changing(now, before, SETTLED_CHANGE, n, n_sensor):
+                        progress[MODE], progress[KEPT] = KEEPING, 0
+            if progress[MODE] == KEEPING:
+                K[step], settled[step] = now, P
+                for i in range(n_sensor):
+                    C_settled[step, i] = C[i]
+                progress[KEPT] += 1
+                if progress[KEPT] == len(K):
+                    progress[MODE] = SETTLED
+            progress[STEP] = (step + 1) % len(K)
         x_in[:], P_in[:] = x, P
 
     return run

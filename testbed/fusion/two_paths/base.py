@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from testbed.fusion.base import BlockFilter, Rows
+from testbed.fusion.base import BlockFilter, CommonParameters, Rows
 from testbed.fusion.kernels.covariance import GATE, PATIENCE
 from testbed.fusion.model import build_model
 from testbed.fusion.two_paths.design import (
@@ -23,7 +23,6 @@ from testbed.fusion.two_paths.design import (
 )
 from testbed.fusion.two_paths.kernel import MEMORY_ROWS, two_paths
 from testbed.fusion.two_paths.noise import noise_variance
-from testbed.parts import Part
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
@@ -31,10 +30,11 @@ if TYPE_CHECKING:
 
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
+    from testbed.parts import Part
     from testbed.signals import FloatArray
 
 
-class TwoPathParameters(Part):
+class TwoPathParameters(CommonParameters):
     """What a filter of two paths is made for; None is derived from the belief's noise.
 
     Parameters

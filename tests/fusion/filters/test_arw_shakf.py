@@ -273,7 +273,7 @@ fusion: {arw_shakf_literal: {bands: BANDS}}
     first, second = (
         one.fusion["arw_shakf_literal"].parameters for one in (scenario, load_scenario(tmp_path / "scenario.yaml"))
     )
-    assert first == second == ArwShakfLiteralParameters(bands="sx300_adis16505")
+    assert first == second == ArwShakfLiteralParameters(bands="sx300_adis16505", start="rest")
     path.write_text(text.replace("BANDS", "sx300"))
     with pytest.raises(ScenarioError, match="unknown set of bands 'sx300'"):
         load_scenario(path)

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.kernels.covariance import kalman_kernel
-from testbed.fusion.model import FusionModel, build_model
+from testbed.fusion.model import FusionModel, build_model, covariance_root
 from testbed.signals import FloatArray, random_stream
 
 DEG = np.pi / 180.0
@@ -129,10 +129,11 @@ def test_errors_and_innovations_are_consistent_when_the_belief_is_true() -> None
     runs, n_time = 200, 1001
     values, vectors = np.linalg.eigh(model.Q)
     root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    start = covariance_root(model.P0)
     nees, nis, counts = 0.0, np.zeros(2), np.zeros(2)
     for _ in range(runs):
         x = np.empty((n_time, 5))
-        x[0] = np.sqrt(np.diag(model.P0)) * rng.standard_normal(5)
+        x[0] = start @ rng.standard_normal(5)
         w = rng.standard_normal((n_time, 5)) @ root.T
         for k in range(1, n_time):
             x[k] = model.F @ x[k - 1] + w[k]

@@ -51,9 +51,9 @@ def readings(reference: Any) -> dict[str, FloatArray]:
 def test_every_step_equals_the_equations(
     reference: Any, readings: dict[str, FloatArray], adapt: Any, chosen: list[int]
 ) -> None:
-    parameters = ShakfParameters(adapt=adapt)
+    parameters = ShakfParameters(adapt=adapt, start="rest")
     ours = Shakf(default_belief(), RATES, parameters).process(readings)
-    model = build_model(default_belief(), RATES, order=1, q=parameters.q, use_input_noise=False)
+    model = build_model(default_belief(), RATES, order=1, q=parameters.q, use_input_noise=False, start="rest")
     floor = parameters.R_floor
     sensors = [reference.sensor(R=R, fit_noise="R" in adapt, fit_offset="r" in adapt, floor=floor) for R in R0.values()]
     wanted = reference.run(model, rows(readings), sensors, adapt_Q=chosen)

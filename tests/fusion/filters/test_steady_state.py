@@ -1,8 +1,8 @@
-"""Constant gains: the settled Kalman filter, and what it costs away from its signal."""
+"""Gains that settle: the Kalman filter at less cost, through gaps, and what it costs away from its signal."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -11,6 +11,10 @@ from testbed.fusion.analysis.optimum import optimum
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.filters.steady_state import SteadyState, SteadyStateParameters
+
+if TYPE_CHECKING:
+    from testbed.fusion import EstimateBlock
+    from testbed.signals import FloatArray
 
 DEG = np.pi / 180.0
 RATES = {"mems_gyro": 2000.0, "mhd_ars": 20000.0}
@@ -21,34 +25,62 @@ QUICK = {
 }
 
 
-@pytest.mark.oracle
-def test_it_is_the_kalman_filter_once_that_has_settled() -> None:
+# Three looks at the gains, a second apart: the first has nothing to compare with.
+SETTLED = 70_000
+
+
+def quick_readings(n: int) -> dict[str, FloatArray]:
     rng = np.random.default_rng(3)
-    readings = {"mems_gyro": 1e-4 * rng.standard_normal(3000), "mhd_ars": 1e-4 * rng.standard_normal(30000)}
+    return {"mems_gyro": 1e-4 * rng.standard_normal(n // 10), "mhd_ars": 1e-4 * rng.standard_normal(n)}
+
+
+def both(readings: dict[str, FloatArray]) -> tuple[EstimateBlock, EstimateBlock]:
+    """Return the settling filter and the Kalman filter of its model."""
     best = optimum(QUICK, RATES, [(10.0, DEG)])
-    fixed = SteadyState(QUICK, RATES, SteadyStateParameters()).process(readings)
-    kalman = Kalman(QUICK, RATES, KalmanParameters(order=best.order, q=best.q)).process(readings)
-    # 1 s is e^-15 of the start in the slowest mode, two seconds e^-30.
-    np.testing.assert_allclose(
-        fixed.rate[-5000:], kalman.rate[-5000:], rtol=0.0, atol=1e-7 * np.max(np.abs(kalman.rate))
-    )
-    np.testing.assert_allclose(fixed.std[-5000:], kalman.std[-5000:], rtol=1e-5)
+    kalman = Kalman(QUICK, RATES, KalmanParameters(order=best.order, q=best.q, coloured=False))
+    return SteadyState(QUICK, RATES, SteadyStateParameters(coloured=False)).process(readings), kalman.process(readings)
+
+
+@pytest.mark.oracle
+def test_it_is_the_kalman_filter_from_the_start_on() -> None:
+    fixed, kalman = both(quick_readings(SETTLED + 2_000))
+    n = 40_000
+    assert np.array_equal(fixed.rate[:n], kalman.rate[:n])
+    assert np.array_equal(fixed.std[:n], kalman.std[:n])
+    # Then with gains that change by less than 1e-3 a second, here by e^-30.
+    assert not np.array_equal(fixed.rate, kalman.rate)
+    assert np.unique(fixed.std[SETTLED:]).size == 10
+    np.testing.assert_allclose(fixed.rate, kalman.rate, rtol=0.0, atol=1e-7 * np.max(np.abs(kalman.rate)))
+    np.testing.assert_allclose(fixed.std, kalman.std, rtol=1e-5)
     for key in ("innovation_variance_mhd_ars", "innovation_variance_mems_gyro"):
-        np.testing.assert_allclose(fixed.diagnostics[key][-5000:], kalman.diagnostics[key][-5000:], rtol=1e-5)
+        np.testing.assert_allclose(fixed.diagnostics[key], kalman.diagnostics[key], rtol=1e-5)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(
+    ("sensor", "lost"),
+    [("mhd_ars", slice(70_005, 72_003)), ("mems_gyro", slice(7_001, 7_030)), ("mhd_ars", slice(70_009, 75_000, 2))],
+)
+def test_a_gap_ends_the_settled_state_and_it_is_the_kalman_filter_again(sensor: str, lost: slice) -> None:
+    readings = quick_readings(SETTLED + 70_000)
+    readings[sensor][lost] = np.nan
+    fixed, kalman = both(readings)
+    np.testing.assert_allclose(fixed.rate, kalman.rate, rtol=0.0, atol=1e-6 * np.max(np.abs(kalman.rate)))
+    np.testing.assert_allclose(fixed.std, kalman.std, rtol=1e-5)
+    assert np.unique(fixed.std[-2_000:]).size == 10
 
 
 def test_the_cycle_of_gains_follows_the_clock_and_not_the_first_reading() -> None:
     """The gyro is due at every tenth step from t = 0, whether or not readings came before: claims repeat with that
     phase.
     """
-    readings = {"mems_gyro": np.zeros(30), "mhd_ars": np.zeros(300)}
-    late = {"mems_gyro": np.full(30, np.nan), "mhd_ars": np.full(300, np.nan)}
-    late["mhd_ars"][13:], late["mems_gyro"][2:] = 0.0, 0.0
+    n = SETTLED + 20_000
+    readings = {"mems_gyro": np.zeros(n // 10), "mhd_ars": np.zeros(n)}
+    late = {key: values.copy() for key, values in readings.items()}
+    late["mhd_ars"][:13], late["mems_gyro"][:2] = np.nan, np.nan
     whole, begun = (SteadyState(QUICK, RATES, SteadyStateParameters()).process(one) for one in (readings, late))
-    assert np.unique(whole.std[20:30]).size == 10
-    for key in ("innovation_variance_mhd_ars", "innovation_variance_mems_gyro"):
-        assert np.array_equal(begun.diagnostics[key][20:], whole.diagnostics[key][20:], equal_nan=True)
-    assert np.array_equal(begun.std[20:], whole.std[20:])
+    assert np.unique(whole.std[-100:]).size == 10
+    np.testing.assert_allclose(begun.std[-100:], whole.std[-100:], rtol=1e-6)
 
 
 def test_it_is_best_at_the_signal_it_was_made_for(reference: Any) -> None:
@@ -56,7 +88,7 @@ def test_it_is_best_at_the_signal_it_was_made_for(reference: Any) -> None:
     error = {}
     rate = reference.sines((100.0, 1.0), duration=2.0)
     for frequency in (1.0, 100.0):
-        p = SteadyStateParameters(frequency=frequency)
+        p = SteadyStateParameters(frequency=frequency, start="rest")
         found = SteadyState(belief, RATES, p).process(reference.readings(rate, 8)).rate - rate
         error[frequency] = np.sqrt(np.mean(found[20_000:] ** 2)) / DEG
     assert error[100.0] < 0.01

@@ -38,7 +38,7 @@ def literal_bank(readings: dict[str, FloatArray], p: WidebandParameters) -> tupl
     n_time = readings["mhd_ars"].size
     x_all, P_all, loglik, e_all, C_all = np.empty((5, q.size, n_time))
     for m, one in enumerate(q):
-        model = build_model(BELIEF, RATES, order=p.order, q=float(one))
+        model = build_model(BELIEF, RATES, order=p.order, q=float(one), start="rest")
         x, P = np.zeros(len(model.F)), model.P0.copy()
         for k in range(n_time):
             if k:
@@ -74,7 +74,16 @@ def test_bank_equals_its_equations(reference: Any, order: int) -> None:
     readings = reference.readings(reference.sines((40.0, 1.0), duration=0.01), 3)
     q = {1: 1e-2 * DEG**2, 3: 1e4 * DEG**2}[order]
     p = WidebandParameters(
-        order=order, q=q, decades=9.0, filters=4, gate=1e6, stuck_after=0, memory=2e-3, restart=np.inf
+        order=order,
+        q=q,
+        decades=9.0,
+        filters=4,
+        surprise=1e6,
+        gate=False,
+        coloured=False,
+        memory=2e-3,
+        restart=np.inf,
+        start="rest",
     )
     ours = run(readings, **p.model_dump())
     rate, std, innovation, variance = literal_bank(readings, p)
@@ -83,15 +92,6 @@ def test_bank_equals_its_equations(reference: Any, order: int) -> None:
     np.testing.assert_allclose(ours.std, std, rtol=1e-6)
     np.testing.assert_allclose(ours.diagnostics["innovation_mhd_ars"], innovation, rtol=0.0, atol=1e-8 * DEG)
     np.testing.assert_allclose(ours.diagnostics["innovation_variance_mhd_ars"], variance, rtol=1e-6)
-
-
-def test_a_stuck_sensor_is_refused_from_the_reading_that_was_promised_on(reference: Any) -> None:
-    """After `stuck_after` exact repetitions, and only until it changes again."""
-    readings = reference.readings(reference.sines((10.0, 1.0), duration=0.1), 7)
-    readings["mhd_ars"][1000:1020] = readings["mhd_ars"][1000]
-    refused = run(readings, stuck_after=5).diagnostics["refused_mhd_ars"]
-    assert refused[1004] == 0.0
-    assert list(np.flatnonzero(np.diff(refused)) + 1) == list(range(1005, 1020))
 
 
 def test_the_weights_follow_the_signal(reference: Any) -> None:
@@ -108,17 +108,18 @@ def test_the_weights_follow_the_signal(reference: Any) -> None:
 def test_a_jump_of_frequency_is_followed(reference: Any) -> None:
     slow, fast = reference.sines((0.5, 1.0), duration=3.0), reference.sines((100.0, 1.0), duration=3.0)
     rate = np.concatenate([slow, fast])
-    error = run(reference.readings(rate, 5)).rate - rate
+    error = run(reference.readings(rate, 5), start="rest").rate - rate
     # From 0.1 s (two memories) after the jump on, what 100 Hz costs a fixed filter and the start-up of the slow mode,
     # with margin.
     assert np.sqrt(np.mean(error[62_000:] ** 2)) / DEG < 0.006
-    assert np.max(np.abs(error[60_000:])) / DEG < 0.1
+    # Ten readings refused at the jump, during which 100 Hz moves by 0.31 deg/s.
+    assert np.max(np.abs(error[60_000:])) / DEG < 0.4
 
 
 def test_an_amplitude_change_of_100_times_is_followed(reference: Any) -> None:
     small, large = reference.sines((10.0, 0.1), duration=2.0), reference.sines((10.0, 10.0), duration=2.0)
     for rate in (np.concatenate([small, large]), np.concatenate([large, small])):
-        block = run(reference.readings(rate, 6))
+        block = run(reference.readings(rate, 6), start="rest")
         error = np.abs(block.rate - rate) / DEG
         assert np.isfinite(block.rate).all()
         assert rmse(block.rate, rate, 1.8) < 0.01
@@ -158,7 +159,7 @@ def spoilt(readings: dict[str, FloatArray], fault: str) -> dict[str, FloatArray]
 def test_a_fault_passes_and_leaves_nothing_behind(reference: Any, fault: str) -> None:
     rate = reference.sines((4.0, 1.0), duration=1.7)
     readings = reference.readings(rate, 7)
-    clean, block = run(readings), run(spoilt(readings, fault))
+    clean, block = run(readings, start="rest"), run(spoilt(readings, fault), start="rest")
     assert np.isfinite(block.rate).all()
     assert np.isfinite(block.std).all()
     # The slow mode of the pair of sensors keeps a trace for half a minute: it may add 0.02 deg/s, a fiftieth of the
@@ -173,18 +174,16 @@ def test_without_the_gate_a_spike_gets_through(reference: Any) -> None:
     """The other way round: the test above sees what the gate does."""
     rate = reference.sines((4.0, 1.0), duration=1.2)
     readings = reference.readings(rate, 7)
-    through = run(spoilt(readings | {}, "spike"), gate=1e6)
+    through = run(spoilt(readings | {}, "spike"), surprise=1e6, gate=False)
     assert np.max(np.abs(through.rate - rate)[20_000:]) > 1.0 * DEG
 
 
 def test_what_was_refused_is_counted(reference: Any) -> None:
     readings = reference.readings(reference.sines((4.0, 1.0), duration=1.3), 7)
-    clean, spiked, stuck = run(readings), run(spoilt(readings, "spike")), run(spoilt(readings, "stuck gyro"))
+    clean, spiked = run(readings, gate=False), run(spoilt(readings, "spike"), gate=False)
     assert clean.diagnostics["refused_mems_gyro"][-1] == 0.0
     assert clean.diagnostics["refused_mhd_ars"][-1] == 0.0
     assert spiked.diagnostics["refused_mhd_ars"][-1] == spiked.diagnostics["refused_mems_gyro"][-1] == 1.0
-    # 400 equal readings, of which the first ten repeats pass.
-    assert 389 <= stuck.diagnostics["refused_mems_gyro"][-1] <= 400
 
 
 @pytest.mark.parametrize(
@@ -195,9 +194,8 @@ def test_what_was_refused_is_counted(reference: Any) -> None:
         {"filters": 5},
         {"memory": 0.005},
         {"restart": 0.1},
-        {"gate": 3.0},
-        {"patience": 0},
-        {"stuck_after": 1},
+        {"surprise": 3.0},
+        {"surprise": 3.0, "patience": 0},
         {"order": 2, "q": 1e3 * DEG**2},
         {"use_input_noise": False},
     ],

@@ -30,7 +30,7 @@ def test_kernel_equals_the_joint_matrix_form(reference: Any, order: int) -> None
     both.
     """
     q = {1: 9e-5, 2: 300.0, 3: 3e6}[order]
-    model = build_model(default_belief(), reference.rates, order=order, q=q)
+    model = build_model(default_belief(), reference.rates, order=order, q=q, start="rest")
     Z = _rows(reference.readings(reference.sines((4.0, 1.0), duration=0.1), 3))
     Z[1, 500:520] = np.inf
     Z[0, 700] = np.inf

@@ -29,8 +29,9 @@ DEG = np.pi / 180.0
 RATES = {"mems_gyro": 2000.0, "mhd_ars": 20000.0}
 EPS = np.finfo(float).eps
 EVERY = [
+    ("kalman", {"coloured": False}),
+    ("kalman", {"order": 2, "coloured": False}),
     ("kalman", {}),
-    ("kalman", {"order": 2}),
     ("shakf", {"adapt": ("R", "Q", "r")}),
     ("shakf", {"adapt": ("Q_rate",)}),
     ("arw_shakf", {}),
@@ -52,7 +53,7 @@ def readings(reference: Any) -> dict[str, FloatArray]:
 @pytest.mark.parametrize(("name", "parameters"), [*EVERY, ("wideband", {})])
 def test_all_forms_are_the_same_filter(name: str, parameters: dict[str, Any], readings: dict[str, FloatArray]) -> None:
     blocks = {
-        form: estimate(name, readings, sample_rate_hz=RATES, form=form, **parameters)
+        form: estimate(name, readings, sample_rate_hz=RATES, start="rest", form=form, **parameters)
         for form in ("joseph", "conventional", "square_root")
     }
     wanted = blocks["joseph"]
@@ -76,8 +77,8 @@ def test_all_forms_are_the_same_filter(name: str, parameters: dict[str, Any], re
 def test_single_precision_differs_but_stays_near(
     name: str, parameters: dict[str, Any], form: str, readings: dict[str, FloatArray]
 ) -> None:
-    double = estimate(name, readings, sample_rate_hz=RATES, form=form, **parameters)
-    single = estimate(name, readings, sample_rate_hz=RATES, form=form, precision="single", **parameters)
+    double = estimate(name, readings, sample_rate_hz=RATES, start="rest", form=form, **parameters)
+    single = estimate(name, readings, sample_rate_hz=RATES, start="rest", form=form, precision="single", **parameters)
     assert np.array_equal(single.rate, single.rate.astype(np.float32))
     assert not np.array_equal(single.rate, double.rate)
     # No bound can be derived through the feedback of the adaptation; 3 % of the amplitude tells rounding from a
