@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import statistics
 
 import numpy as np
@@ -156,8 +157,9 @@ def test_a_belief_as_written_bears_no_name_but_its_own(tmp_path):
         ("exact", gyro.numerator, "given"),
         ("nobody", gyro.numerator, "given"),
     ):
-        written = f"{{numerator: {list(numerator)}, denominator: {list(gyro.denominator)}, source: {source}, "
-        written += f"input_noise: {gyro.input_noise!r} rad/sqrt(s), output_noise: {gyro.output_noise!r} rad/sqrt(s)}}"
+        changed = gyro.model_copy(update={"source": source, "numerator": numerator})
+        # JSON is YAML.
+        written = json.dumps(changed.model_dump(mode="json", context={"border": True}, exclude_none=True))
         own = f"kalman: {{belief: {{mems_gyro: {written}, mhd_ars: {written}}}}}"
         assert short(tmp_path, ("kalman: {}", own)).fusion["kalman"].belief["mems_gyro"].source == wanted
 
