@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
 
 Coefficient = Annotated[float, Field(allow_inf_nan=False)]
+Coefficients = Annotated[tuple[Coefficient, ...], Field(max_length=33)]
 
 _CLOSEST_POLES = 1e-3
 
@@ -84,8 +85,8 @@ class SensorBelief(Part):
         Where it is from, as shown beside results: the name of a shipped belief, "exact" or "given". It changes nothing.
     """
 
-    numerator: tuple[Coefficient, ...]
-    denominator: tuple[Coefficient, ...]
+    numerator: Coefficients
+    denominator: Coefficients
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
     noise_knee: Frequency | None = None

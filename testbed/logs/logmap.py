@@ -12,7 +12,6 @@ from testbed.document import Document
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
 from testbed.parts import Part
-from testbed.units import Frequency
 
 Kind = Literal["rate", "increment", "angle"]
 _COUNTS = {"lsb", "count", "counts", "digit", "digits"}
@@ -29,6 +28,12 @@ def _plain_frequency(value: Any) -> Any:
     return quantity(value, "Hz", "100 Hz", "rate") if isinstance(value, str) else value
 
 
+def _by_number(value: Any) -> Any:
+    """Take a column's number as its text."""
+    return str(value) if type(value) is int else value
+
+
+ColumnText = Annotated[str, BeforeValidator(_by_number)]
 Location = Annotated[Path, AfterValidator(_beside_map)]
 
 
@@ -49,10 +54,10 @@ class TimeMap(Part):
         Added to the time [s].
     """
 
-    column: str | None = None
+    column: ColumnText | None = None
     unit: str | None = None
     epoch: str | None = None
-    rate: Annotated[Frequency | None, BeforeValidator(_plain_frequency)] = None
+    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False), BeforeValidator(_plain_frequency)] | None = None
     offset: Annotated[float, units.Quantity("s", "1 ms")] = 0.0
 
     @model_validator(mode="after")
@@ -92,7 +97,7 @@ class ChannelMap(Part):
         Largest value of the sensor with its unit, such as ``2000 deg/s``.
     """
 
-    column: str
+    column: ColumnText
     file: Location | None = None
     topic: str | None = None
     unit: str | None = None

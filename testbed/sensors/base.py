@@ -14,7 +14,7 @@ from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.sensors.data_sheet import Sheet, Word
 from testbed.signals import BASE_RATE_HZ
-from testbed.units import Frequency
+from testbed.units import SampleRate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -106,7 +106,7 @@ class Sensor(Part):
 
     words: ClassVar[tuple[Word, ...]] = ()
 
-    sample_rate: Frequency
+    sample_rate: SampleRate
     noise: bool = True
     mounting: Mounting = Mounting()
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
 # A stated total noise is a typical figure: as far as this from what density and bandwidth make it is no contradiction.
 _TRUSTED = 0.15
-Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1, max_length=33)]
 
 
 def _whole_word(given: dict[str, Any]) -> float:

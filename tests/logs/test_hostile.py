@@ -175,3 +175,16 @@ def test_a_directory_and_a_missing_file_are_refused(tmp_path):
     for path in (tmp_path, tmp_path / "none.csv"):
         with pytest.raises(ScenarioError, match="expected a recording"):
             read_log(path)
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_a_text_that_is_inspected(tmp_path):
+    """A text of 4 MB and one of 80 MB; `benchmarks/bench_logs.py --long` does it with 1 GB."""
+    path = tmp_path / "log.csv"
+    rows = b"".join(b"%d,%d.25\n" % (k * 1000, k % 7) for k in range(300_000))
+    path.write_bytes(b"t_us,w [deg/s]\n" + rows)
+    small = run(path, "log", "inspect")
+    path.write_bytes(b"w [deg/s]\n" + rows.replace(b",", b".") * 20)
+    large = run(path, "log", "inspect")
+    assert (small[0], large[0]) == (0, 0)
+    assert large[3] < small[3] + 30 * 2**20
