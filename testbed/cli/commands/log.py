@@ -40,7 +40,9 @@ def inspect(
     proposed = propose(open_table(source, text)) if map_ is None else Proposal(plans_of(source, load_map(map_)), ())
     table = proposed.plans[0].table
     reports = look(proposed.plans)
-    output.show(document(table, reports, proposed), lambda: print_reports(table, reports, proposed))
     if out is not None:
         write_map(out, source, proposed)
+    found = {**document(table, reports, proposed), "written": None if out is None else str(out)}
+    output.show(found, lambda: print_reports(table, reports, proposed))
+    if out is not None:
         output.say(f"wrote {out}")
