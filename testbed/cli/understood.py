@@ -10,7 +10,7 @@ from rich.table import Table
 
 from testbed.cli.console import terminal
 from testbed.cli.terminal import step_words
-from testbed.runs.table import number
+from testbed.runs.table import rate_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -91,7 +91,7 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
     if facts.torque_limit is not None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
-    noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
+    noise = f"arithmetic noise of the truth {rate_text(math.degrees(facts.truth_noise), ('deg/s', 1.0))} rms"
     step = step_words(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:

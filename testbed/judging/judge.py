@@ -13,6 +13,7 @@ from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
+from testbed.scenario.departures import departures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,8 +40,9 @@ class Judge:
         self._scenario = scenario
         self._rates = rates
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
-        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
-        self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        span = (scenario.frame.settle, scenario.frame.duration)
+        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True, span=span) for name in scenario.sensors}
+        self._errors |= {name: ErrorMetrics(scenario.lines, span=span) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._table = TableMetrics(scenario, step)
 
@@ -108,6 +110,7 @@ class Judge:
             "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "setup": departures(self._scenario),
             "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)

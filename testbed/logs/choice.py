@@ -11,7 +11,7 @@ from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap, load_map
 from testbed.logs.options import quantity, refusal
 from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan
-from testbed.logs.reader import read_map, read_plans
+from testbed.logs.reader import is_map, read_map, read_plans
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     Parameters
     ----------
     path : Path
-        The recording.
+        The recording, or a map that names it.
     wanted : Selection
         The options.
     text : TextOptions, optional
@@ -43,7 +43,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     ScenarioError
         If something is missing, contradicts, is not understood or not in the file; with the option.
     """
-    if wanted.map is not None:
+    if wanted.map is not None or is_map(path):
         return _mapped(path, wanted)
     table = open_table(path, text)
     rate_hz = quantity(wanted.rate, "Hz", "100 Hz", "--rate") if wanted.rate else None
@@ -83,13 +83,13 @@ def _as_options(error: ValidationError, prefix: str = "") -> ScenarioError:
 
 
 def _mapped(path: Path, wanted: Selection) -> list[LogChannel]:
-    assert wanted.map is not None
+    place = wanted.map or path
     if wanted.given:
-        raise refusal(wanted.map, f"says this: leave out {', '.join(wanted.given)}", "--map")
-    channels = read_map(path, load_map(wanted.map)).channels
+        raise refusal(place, f"says this: leave out {', '.join(wanted.given)}", "--map")
+    channels = read_map(None if wanted.map is None else path, load_map(place)).channels
     unknown = [name for name in wanted.column or [] if name not in channels]
     if unknown:
-        raise refusal(wanted.map, str(UnknownNameError("channel", unknown[0], channels)), "--column")
+        raise refusal(place, str(UnknownNameError("channel", unknown[0], channels)), "--column")
     if wanted.column:
         return [channels[name] for name in wanted.column]
     return [channel for channel in channels.values() if channel.quantity in ROTATIONS]

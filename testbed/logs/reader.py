@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
+from testbed.logs.chain import FileChain
 from testbed.logs.channel import Log, LogChannel
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
@@ -40,7 +41,7 @@ def read_log(
     Parameters
     ----------
     path : str or Path
-        The file.
+        The file, or a map that names it.
     map : LogMap, mapping, str or Path, optional
         Which column is what, or the YAML file that says so; left out: what the names of the columns say.
 
@@ -63,7 +64,14 @@ def read_log(
     >>> round(channel.rate_hz, 6), round(float(channel.values[1]), 6)
     (2000.0, 0.017453)
     """
+    if map is None and is_map(path):
+        return read_map(None, load_map(Path(path)))
     return read_map(Path(path), as_map(map))
+
+
+def is_map(path: str | Path) -> bool:
+    """Return whether a file is a map, by its name."""
+    return Path(path).suffix.lower() in {".yaml", ".yml"}
 
 
 def as_map(given: LogMap | Mapping[str, Any] | str | Path | None) -> LogMap | None:
@@ -95,23 +103,17 @@ def read_map(path: Path | None, found: LogMap | None) -> Log:
 def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
     """Return how the channels of a map are read."""
     options = TextOptions(found.separator, found.decimal, found.encoding, found.skip)
-    files = (
-        [path]
-        if path is not None
-        else found.file
-        if isinstance(found.file, list)
-        else [found.file]
-        if found.file
-        else []
-    )
-    tables: dict[Path, Table] = {}
+    said = found.file if isinstance(found.file, list) else [found.file] if found.file else []
+    files = tuple(said if path is None else [path])
+    tables: dict[tuple[Path, ...], Table] = {}
     plans = []
     for name, channel in found.channels.items():
-        own = channel.file or (files[0] if files else None)
-        if own is None:
+        own = (channel.file,) if channel.file else files
+        if not own:
             raise ScenarioError([Problem("expected the file of the recording", key=f"channels.{name}.file")])
         if own not in tables:
-            tables[own] = open_table(own, options)
+            opened = [open_table(one, options) for one in own]
+            tables[own] = opened[0] if len(opened) == 1 else FileChain(opened)
         plans.append(plan(name, channel, tables[own], lambda field, name=name: f"channels.{name}.{field}"))  # type: ignore[misc]
     return plans
 

@@ -48,11 +48,15 @@ class Entry(BaseModel, Mapping[str, Any]):
 
 
 class LineMetrics(Entry):
-    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, errors [deg/s]."""
+    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, each with half the width
+    of its 95 % interval, and errors [deg/s].
+    """
 
     frequency_hz: float
     gain: float | None = None
+    gain_ci95: float | None = None
     phase_deg: float | None = None
+    phase_ci95_deg: float | None = None
     error_deg_s: float | None = None
     optimum_deg_s: float | None = None
 
@@ -158,6 +162,16 @@ class Expectation(Entry):
     met: bool
 
 
+class PartSetup(Entry):
+    """A part of the scenario: the preset that it takes, and each `key` that is written beside it with its value `here`
+    and in the `preset`.
+    """
+
+    part: str
+    preset: str | None = None
+    differs: list[dict[str, str | None]] = []
+
+
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
@@ -181,6 +195,7 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     expectations: list[Expectation] = []
     versions: dict[str, Any] = {}
+    setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []
 
     @property

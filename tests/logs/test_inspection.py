@@ -152,6 +152,24 @@ def test_a_wrong_map_is_refused_with_its_line(tmp_path, old, new, line, message)
     assert caught.value.problems[0].line == line
 
 
+def test_a_map_names_consecutive_files_and_may_stand_for_them(tmp_path):
+    half = N_TIME // 2
+    for name, part in (("a", slice(half)), ("b", slice(half, None))):
+        (tmp_path / f"{name}.csv").write_text(lines(SECONDS[part], DEG[part], head="t,w [deg/s]\n"))
+    said = "channels: {gyro: {column: 2, time: {column: t}}}\n"
+    (tmp_path / "log.yaml").write_text("file: [a.csv, b.csv]\n" + said)
+    log = read_log(tmp_path / "log.yaml")
+    np.testing.assert_allclose(log.channels["gyro"].values, np.deg2rad(RATE), atol=1e-12)
+    assert log.channels["gyro"].clock.even
+    assert np.array_equal(read(tmp_path / "log.yaml")[0].rate, log.channels["gyro"].values)
+    (tmp_path / "b.csv").write_text(lines(SECONDS, DEG, head="t,v [deg/s]\n"))
+    with pytest.raises(ScenarioError, match="expected the columns of"):
+        read_log(tmp_path / "log.yaml")
+    (tmp_path / "log.yaml").write_text(said)
+    with pytest.raises(ScenarioError, match="expected the file of the recording"):
+        read_log(tmp_path / "log.yaml")
+
+
 def test_one_column_may_be_two_channels(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(TEXTS["plain"][0])

@@ -35,7 +35,9 @@ def inspect(
     table = open_table(source, text)
     proposed = propose(table)
     reports = look(proposed.plans)
-    output.show(document(table, reports, proposed), lambda: print_reports(table, reports, proposed))
     if out is not None:
         write_map(out, source, proposed)
+    found = {**document(table, reports, proposed), "written": None if out is None else str(out)}
+    output.show(found, lambda: print_reports(table, reports, proposed))
+    if out is not None:
         output.say(f"wrote {out}")
