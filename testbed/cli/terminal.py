@@ -48,6 +48,7 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for name, source in metrics.sensors.items():
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
+    _print_bounds(console, metrics, unit)
     _print_budget(console, metrics.budget, unit)
     _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
@@ -148,6 +149,20 @@ def _line_cell(line: LineMetrics) -> str:
     lost = line.phase_ci95_deg is not None and line.phase_ci95_deg >= 90.0
     phase = "phase lost" if lost else f"{bounded(line.phase_deg, line.phase_ci95_deg)} deg"
     return f"{bounded(line.gain, line.gain_ci95)}, {phase}{over}".replace("−", "-")
+
+
+def _print_bounds(console: Console, metrics: RunMetrics, unit: tuple[str, float]) -> None:
+    """Print what nothing gets below, or why there is nothing."""
+    for source in [*metrics.fusion.values()][:1]:
+        bounds = {
+            "floor": source.floor_rmse_deg_s,
+            "floor with the prior": source.prior_floor_rmse_deg_s,
+            "optimum over this run": source.optimum_rmse_deg_s,
+            "settled": source.optimum_settled_deg_s,
+        }
+        known = ", ".join(f"{name} {rate_text(value, unit)}" for name, value in bounds.items() if value is not None)
+        reason = f"none {'else ' if known else ''}since {metrics.bounds_reason}" if metrics.bounds_reason else ""
+        console.print(f"bounds: {'; '.join(filter(None, (known, reason)))}", soft_wrap=True, highlight=False)
 
 
 def _print_budget(console: Console, budget: Budget | None, unit: tuple[str, float]) -> None:

@@ -113,6 +113,13 @@ class SensorBelief(Part):
         """Whether a constant rate shows in the reading at all."""
         return self.numerator[-1] != 0.0
 
+    @property
+    def walks(self) -> bool:
+        """Whether its rate random walk counts above the lowest frequency, so that it is a state of its own."""
+        lowest = 2.0 * np.pi * self.lowest_frequency
+        beside = self.input_noise**2 + self.bias_instability**2 / lowest
+        return bool(self.rate_random_walk**2 > 0.03 * beside * lowest**2)
+
     def inner_slow_density(self, freq_hz: FloatArray) -> FloatArray:
         """Return the density of the 1/f noise that passes the dynamics [rad^2/s], at frequencies above zero [Hz]."""
         density: FloatArray = self.bias_instability**2 / (2.0 * np.pi * np.maximum(freq_hz, self.lowest_frequency))

@@ -1,4 +1,4 @@
-"""Who sees what: the crossover of the sensors, their share in the noise floor by band, and the optimum of a signal."""
+"""Who sees what: the crossover of the sensors and their share in the noise floor by band."""
 
 from __future__ import annotations
 
@@ -7,14 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.fusion.analysis.optimum import Optimum, optima
-from testbed.scenario.beliefs import believed, excess_density
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from testbed.fusion.belief import SensorBelief
-    from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
 # Where the first band of a budget begins, as the integral of the floor does.
@@ -127,58 +122,3 @@ def _all_crossovers(psds: Mapping[str, Callable[[FloatArray], FloatArray]], band
             if here[first] <= 1.01 * min(here.values()):
                 found.append(float(freq))
     return sorted(found)
-
-
-def signal_optimum(
-    sensors: Mapping[str, Sensor],
-    sample_rate_hz: Mapping[str, float],
-    lines: Sequence[tuple[float, float]],
-    *,
-    coloured: bool = False,
-) -> Optimum | None:
-    """Return the best settled filter of a signal for these very sensors, None if one of them has no rational model.
-
-    With white noise only it is a bound for any run; 1/f and bias noise build up within minutes, so that a short run may
-    stay below a bound that has them.
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-        The instruments.
-    sample_rate_hz : mapping of str to float
-        Rate of each [Hz].
-    lines : sequence of (float, float)
-        Frequency [Hz] and amplitude [rad/s] of each line of the signal.
-    coloured : bool, optional
-        Count the sensors' noise beyond its white part too, which the filters do not know of.
-    """
-    found = signal_optima(sensors, sample_rate_hz, [lines], coloured=coloured)
-    return None if found is None else found[0]
-
-
-def signal_optima(
-    sensors: Mapping[str, Sensor],
-    sample_rate_hz: Mapping[str, float],
-    signals: Sequence[Sequence[tuple[float, float]]],
-    *,
-    coloured: bool = False,
-) -> list[Optimum] | None:
-    """Return the `signal_optimum` of each of several signals, None if a sensor has no rational model.
-
-    Parameters
-    ----------
-    sensors, sample_rate_hz, coloured : mapping, mapping, bool
-        As for `signal_optimum`.
-    signals : sequence of sequence of (float, float)
-        Lines of each signal: frequency [Hz] and amplitude [rad/s].
-    """
-    belief: dict[str, SensorBelief] = {}
-    excess: dict[str, Callable[[FloatArray], FloatArray]] = {}
-    for name, sensor in sensors.items():
-        one = believed(sensor)
-        if one is None:
-            return None
-        belief[name] = one
-        if coloured:
-            excess[name] = excess_density(sensor, one)
-    return optima(belief, sample_rate_hz, signals, excess=excess)

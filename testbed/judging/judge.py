@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.belief import declared
+from testbed.judging.bounds import Bounds
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
-from testbed.metrics.errors import ErrorMetrics, floor_density, floor_rmse
+from testbed.metrics.errors import ErrorMetrics, floor_density
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
 from testbed.scenario.departures import departures
@@ -18,6 +19,7 @@ from testbed.scenario.departures import departures
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.fusion.start import StartKind
     from testbed.runs.block import RunBlock
     from testbed.scenario.model import Scenario
     from testbed.scenario.step_choice import StepChoice
@@ -76,23 +78,28 @@ class Judge:
             Of what the result depends on, to be noted with it.
         """
         frame = self._scenario.frame
-        psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
-        floor = floor_rmse(list(psds.values()), frame.bandwidth) if len(psds) == len(self._scenario.sensors) else None
-        floor_deg = None if floor is None else float(np.rad2deg(floor))
-        optimum_deg, of_lines = (None, {}) if floor is None else self._optima()
+        bounds = Bounds(self._scenario.sensors, self._rates)
+        floors = {
+            "floor_rmse_deg_s": in_deg(bounds.floor(frame.bandwidth)),
+            "prior_floor_rmse_deg_s": in_deg(bounds.prior_floor(frame.bandwidth, frame.no_rate_below)),
+        }
+        settled, why = self._settled(bounds)
+        psds = {} if bounds.reason else bounds.densities
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
                 "belief": declared(spec.belief),
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
-                "floor_rmse_deg_s": floor_deg,
-                "optimum_rmse_deg_s": optimum_deg,
+                **floors,
+                "optimum_rmse_deg_s": self._of_run(bounds, name)[0],
+                "optimum_settled_deg_s": settled,
                 "consistency": self._consistency[name].result(),
             }
             for name, spec in self._scenario.fusion.items()
         }
-        for row in fusion.values():
+        for name, row in fusion.items():
+            of_lines = self._of_run(bounds, name)[1]
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
         from testbed.judging.budget import budget_summary
@@ -106,8 +113,9 @@ class Judge:
             "turntable": self._table.result(),
             "sensors": sensors,
             "fusion": fusion,
-            "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
-            "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
+            "bounds_reason": bounds.reason or why,
+            "floor_density": _floor_curve(psds, frame.bandwidth) if psds else None,
+            "budget": budget_summary(psds, frame.bandwidth) if psds else None,
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
             "setup": departures(self._scenario),
@@ -115,25 +123,34 @@ class Judge:
         }
         return RunMetrics.model_validate(found)
 
-    def _optima(self) -> tuple[float | None, dict[float, float]]:
-        """Return what the best fixed filter of this very signal leaves [deg/s], and of each line alone, by frequency
-        [Hz].
-
-        One value for all filters; None and nothing without lines.
+    def _lines(self) -> list[tuple[float, float]]:
+        """Return frequency [Hz] and amplitude [rad/s] of the lines in the truth; none of a table that does not move,
+        whose truth has only arithmetic noise.
         """
-        lines = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
-        # A table that does not move has no lines in its truth, only arithmetic noise.
-        moving = [(freq, amplitude) for freq, amplitude in lines if amplitude > np.deg2rad(1e-9)]
-        if not moving:
-            return None, {}
-        from testbed.judging.budget import signal_optima
+        found = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
+        return [(freq, amplitude) for freq, amplitude in found if amplitude > np.deg2rad(1e-9)]
 
-        rates = {name: self._rates[name] for name in self._scenario.sensors}
-        best = signal_optima(self._scenario.sensors, rates, [lines, *([line] for line in moving)])
+    def _settled(self, bounds: Bounds) -> tuple[float | None, str | None]:
+        """Return what the best filter of this very signal leaves once settled [deg/s], or None and why."""
+        lines = self._lines()
+        if not lines:
+            return None, "the signal has no lines" if self._scenario.fusion else None
+        best, why = bounds.settled([lines])
+        return (None, why) if best is None else (in_deg(best[0].rmse), None)
+
+    def _of_run(self, bounds: Bounds, name: str) -> tuple[float | None, dict[float, float | None]]:
+        """Return what the best filter of this very signal leaves in this run, from the start that a filter knows of,
+        and of each line alone by frequency [Hz] [deg/s].
+        """
+        frame, lines = self._scenario.frame, self._lines()
+        if not lines:
+            return None, {}
+        start: StartKind = getattr(self._scenario.fusion[name].parameters, "start", "rest")
+        best, _ = bounds.of_run([lines, *([line] for line in lines)], start, (frame.settle, frame.duration))
         if best is None:
             return None, {}
-        whole, *alone = (float(np.rad2deg(one.rmse)) for one in best)
-        return whole, {freq: value for (freq, _), value in zip(moving, alone, strict=True)}
+        whole, *alone = (in_deg(one.rmse) for one in best)
+        return whole, {freq: value for (freq, _), value in zip(lines, alone, strict=True)}
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
         rows = []
@@ -149,6 +166,11 @@ class Judge:
                 }
             )
         return rows
+
+
+def in_deg(rate: float | None) -> float | None:
+    """Return a rate [rad/s] in deg/s, None for None."""
+    return None if rate is None else float(np.rad2deg(rate))
 
 
 def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
     from testbed.signals import FloatArray
 
+# Where the integral of the floor begins [Hz].
+_LOWEST_HZ = 1e-6
+
 
 class ErrorMetrics:
     r"""Error of one rate signal against the truth at the same instants.
@@ -164,12 +167,14 @@ def floor_density(psds: Sequence[Callable[[FloatArray], FloatArray]], freq_hz: F
     return floor
 
 
-def floor_rmse(psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float) -> float | None:
-    r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_0^W df / \sum_i 1/S_i}`
+def floor_rmse(
+    psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float, from_hz: float = 0.0
+) -> float | None:
+    r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_{f_0}^W df / \sum_i 1/S_i}`
     [rad/s].
 
-    Non-causal; None if no sensor sees some part of the band. The integral runs over ln f from 1e-6 Hz, 200 points per
-    decade (trapezoid); below that the density is taken as constant.
+    Non-causal (Wiener); None if no sensor sees some part of the band. The integral runs over ln f from 1e-6 Hz, 200
+    points per decade (trapezoid); below that the density is taken as constant.
 
     Parameters
     ----------
@@ -177,12 +182,15 @@ def floor_rmse(psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz:
         Input-referred two-sided noise density of each sensor, Hz -> rad^2/s.
     bandwidth_hz : float
         W [Hz].
+    from_hz : float, optional
+        f_0, below which the signal is known to have nothing [Hz].
     """
-    if not psds:
+    if not psds or from_hz >= bandwidth_hz:
         return None
-    decades = np.log10(bandwidth_hz) + 6.0
-    freq = np.logspace(-6.0, np.log10(bandwidth_hz), max(int(200 * decades), 2))
+    lowest = max(from_hz, _LOWEST_HZ)
+    freq = np.geomspace(lowest, bandwidth_hz, max(int(200 * np.log10(bandwidth_hz / lowest)), 2))
     density = floor_density(psds, freq)
     if not np.all(np.isfinite(density)):
         return None
-    return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + density[0] * freq[0])))
+    below = density[0] * max(freq[0] - from_hz, 0.0)
+    return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + below)))

@@ -18,7 +18,8 @@ METRICS = {
     "peak_error_deg_s": "peak error",
     "floor_rmse_deg_s": "noise floor",
     "ratio": "RMSE / floor",
-    "optimum_rmse_deg_s": "optimum",
+    "optimum_rmse_deg_s": "optimum of this run",
+    "optimum_settled_deg_s": "settled optimum",
     "optimum_ratio": "RMSE / optimum",
     "mean_std_deg_s": "predicted std",
 }
@@ -78,7 +79,9 @@ def _accuracy(metrics: RunMetrics) -> list[str]:
         )
         text.append(f"It is {significant(ratio)} times the noise floor, {known}.")
     if to_optimum is not None:
-        text.append(f"It is {significant(to_optimum)} times the optimum, the best settled filter for this very signal.")
+        text.append(
+            f"It is {significant(to_optimum)} times the optimum, the best linear filter of this signal and start."
+        )
     return text
 
 

@@ -84,7 +84,9 @@ class SourceMetrics(Entry):
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
     floor_rmse_deg_s: float | None = None
+    prior_floor_rmse_deg_s: float | None = None
     optimum_rmse_deg_s: float | None = None
+    optimum_settled_deg_s: float | None = None
     consistency: ConsistencyMetrics | None = None
 
     def over(self, bound: float | None) -> float | None:
@@ -191,6 +193,7 @@ class RunMetrics(Entry):
     turntable: TurntableMetrics | None = None
     sensors: dict[str, SourceMetrics]
     fusion: dict[str, SourceMetrics]
+    bounds_reason: str | None = None
     floor_density: FloorDensity | None = None
     budget: Budget | None = None
     expectations: list[Expectation] = []

@@ -13,8 +13,6 @@ from testbed.parts import preset
 from testbed.sensors import load_preset
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
@@ -202,21 +200,6 @@ def _white_noise(sensor: Sensor, freq: FloatArray) -> tuple[float, float]:
     level, _ = nnls(terms / density[:, None] / size, np.ones(density.size))
     inner, outer = np.sqrt(level / size)
     return float(inner), float(outer)
-
-
-def excess_density(sensor: Sensor, belief: SensorBelief) -> Callable[[FloatArray], FloatArray]:
-    """Return the density of the reading beyond the belief's white noise, Hz -> rad^2/s."""
-
-    def density(freq_hz: FloatArray) -> FloatArray:
-        power = np.abs(sensor.response(freq_hz)) ** 2
-        beyond = sensor.input_noise_psd(freq_hz) * power - belief.input_noise**2 * power - belief.output_noise**2
-        # Below 2 % it is the misfit of the white level.
-        kept: FloatArray = np.where(
-            beyond > 0.02 * (belief.input_noise**2 * power + belief.output_noise**2), beyond, 0.0
-        )
-        return kept
-
-    return density
 
 
 def _slow_and_ends(sensor: Sensor) -> dict[str, Any]:

@@ -67,6 +67,8 @@ class Frame(Part):
         Of every instrument with temperature terms, such as ``25 degC``, or from `start` to `stop` over a time [K].
     bandwidth : float, optional
         Bandwidth W of the noise floor in the metrics [Hz].
+    no_rate_below : float, optional
+        The signal is known to have nothing below this [Hz]: then the metrics have a floor with that prior too.
     detail : tuple of two floats, optional
         From when to when the recording holds every sample [s]; two seconds after `settle` if not given, at least 1000
         samples.
@@ -81,6 +83,7 @@ class Frame(Part):
     ramp_in: Duration = 0.5
     temperature: TemperatureProfile = ROOM
     bandwidth: Frequency = 1000.0
+    no_rate_below: Frequency | None = None
     detail: tuple[Duration, Duration] | None = None
 
 
@@ -91,7 +94,9 @@ METRICS = (
     "mean_std_deg_s",
     "inside_2_std",
     "floor_rmse_deg_s",
+    "prior_floor_rmse_deg_s",
     "optimum_rmse_deg_s",
+    "optimum_settled_deg_s",
     "missing",
 )
 

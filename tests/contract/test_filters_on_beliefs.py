@@ -12,7 +12,7 @@ from testbed.fusion.belief import load_belief
 from testbed.parts import preset, preset_names
 from testbed.scenario.beliefs import belief_of
 from testbed.sensors import load_preset
-from tests.contract.records import BELIEF, DEG, METHODS, NAMES, RATES, readings_of, sines
+from tests.contract.records import BELIEF, DEG, METHODS, NAMES, RATES, from_rest, readings_of, sines
 
 PRESETS = {name: preset("testbed.sensors", name)["type"] for name in preset_names("testbed.sensors")}
 FAST = [name for name, kind in PRESETS.items() if kind == "mhd_ars"]
@@ -75,7 +75,7 @@ def test_a_fixed_pair_of_paths_follows_a_sine_with_any_of_them(name, case_name):
     rate = sines((10.0, 1.0), duration=1.5)
     if refusal(name, case_name):
         pytest.skip("refused")
-    stage = METHODS[name](belief, rates, METHODS[name].Parameters())
+    stage = METHODS[name](belief, rates, METHODS[name].Parameters(**from_rest(name)))
     block = stage.process(readings_of(rate, 1, belief, rates))
     error, claimed = (np.sqrt(np.mean(x[10_000:] ** 2)) for x in (block.rate - rate, block.std))
     # In proportion for a gyro of more than 1 deg/sqrt(h).

@@ -7,7 +7,6 @@ independently.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,7 @@ import numpy as np
 from testbed.fusion.model import FusionModel, build_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import ComplexArray, FloatArray
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 # Decades of q [rad^2/s^(2m+1)] that are searched, per order m: from a filter slower than the crossover of the sensors
 # to one beyond 1 kHz.
 DECADES = {1: (-10, 4), 2: (-8, 12), 3: (-6, 17)}
-# Where noise beyond the model's is looked for: 1/f is above the white noise below some hertz only.
-_COLOURED_HZ = np.logspace(-5.0, 2.0, 71)
 # 2^40 periods are past any time constant.
 _DOUBLINGS = 40
 
@@ -135,30 +132,6 @@ class FixedFilters:
             gains.append(X[..., 0])
         return np.array(gains)
 
-    def coloured_variance(self, excess: Sequence[Callable[[FloatArray], FloatArray] | None]) -> FloatArray:
-        r"""Return the error variance from noise on the readings that the model does not have [rad^2/s^2], shape
-        (n_sensor, n_q).
-
-        .. math:: 2 \int |T_i(f)|^2 S_i(f) df
-
-        with T_i from the reading of sensor i to the estimate; trapezoid in ln f, 1e-5 to 100 Hz, taken as constant
-        below.
-
-        Parameters
-        ----------
-        excess : sequence of callable or None
-            Two-sided density S of each sensor's reading beyond the model's white noise, Hz -> rad^2/s; None for none.
-        """
-        variance = np.zeros((len(excess), self.q.size))
-        for i, psd in enumerate(excess):
-            if psd is not None:
-                only = np.zeros((len(excess), _COLOURED_HZ.size), complex)
-                only[i] = 1.0
-                passed = np.mean(np.abs(self.gain(_COLOURED_HZ, only)) ** 2, axis=0) * psd(_COLOURED_HZ)
-                tail = passed[:, 0] * _COLOURED_HZ[0]
-                variance[i] = 2.0 * (np.trapezoid(passed * _COLOURED_HZ, np.log(_COLOURED_HZ), axis=1) + tail)
-        return variance
-
 
 def settled_filters(
     belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], *, order: int, q: FloatArray
@@ -196,45 +169,83 @@ def settled_filters(
         msg = f"belief: expected an output_noise above 0 for each of {list(model.sensors)}"
         raise ValueError(msg)
     Q = model.Q + np.asarray(q)[:, None, None] * unit
-    due = np.array([[p % stride == 0 for stride in model.strides] for p in range(math.lcm(*model.strides))])
-    P = _cycle_start(model, Q, due)
-    prior, gains = [], []
-    for used in due:
+    period = period_map(model, Q)
+    for _ in range(_DOUBLINGS):
+        period = period.then(period)
+    return filters_from(model, np.asarray(q, float), Q, period.Q)
+
+
+@dataclass(frozen=True)
+class CycleMap:
+    """The map P -> Q + A P (I + G P)^-1 A' that takes a prior covariance over steps with their readings.
+
+    Parameters
+    ----------
+    A, G, Q : ndarray, shape (n_q, n_state, n_state)
+        One map for each of several filters.
+    """
+
+    A: FloatArray
+    G: FloatArray
+    Q: FloatArray
+
+    def then(self, other: CycleMap) -> CycleMap:
+        """Return the map of these steps and, after them, those of another."""
+        inverse = np.linalg.inv(np.eye(self.A.shape[-1]) + self.Q @ other.G)
+        A = other.A @ inverse @ self.A
+        G = self.G + _t(self.A) @ other.G @ inverse @ self.A
+        Q = other.Q + other.A @ inverse @ self.Q @ _t(other.A)
+        return CycleMap(A, 0.5 * (G + _t(G)), 0.5 * (Q + _t(Q)))
+
+    def applied(self, P: FloatArray) -> FloatArray:
+        """Return the covariance behind the steps from that before them, shape (n_q, n_state, n_state)."""
+        eye = np.eye(self.A.shape[-1])
+        after: FloatArray = self.Q + self.A @ P @ np.linalg.solve(eye + self.G @ P, _t(self.A))
+        return 0.5 * (after + _t(after))
+
+
+def period_map(model: FusionModel, Q: FloatArray) -> CycleMap:
+    """Return the map of one period of the readings, which all sensors begin together.
+
+    Parameters
+    ----------
+    model : FusionModel
+        F, H, R.
+    Q : ndarray, shape (n_q, n_state, n_state)
+        Covariance of a step of each filter [rad^2/s^2].
+    """
+    whole = None
+    for used in model.due:
+        h = model.H[used]
+        G = np.broadcast_to(h.T @ (h / model.R[used, None]), Q.shape)
+        step = CycleMap(np.broadcast_to(model.F, Q.shape), G, Q)
+        whole = step if whole is None else whole.then(step)
+    assert whole is not None
+    return whole
+
+
+def filters_from(model: FusionModel, q: FloatArray, Q: FloatArray, prior: FloatArray) -> FixedFilters:
+    """Return the filters whose gains are those of a period that begins with a covariance.
+
+    Parameters
+    ----------
+    model : FusionModel
+        F, H, R.
+    q : ndarray, shape (n_q,)
+        Signal noise of each filter [rad^2/s^(2m+1)].
+    Q, prior : ndarray, shape (n_q, n_state, n_state)
+        Covariance of a step, and before the first readings of the period [rad^2/s^2].
+    """
+    P, priors, gains = prior, [], []
+    for used in model.due:
         K = np.zeros((len(P), len(model.F), used.size))
         h = model.H[used]
         K[:, :, used] = np.swapaxes(np.linalg.solve(h @ P @ h.T + np.diag(model.R[used]), h @ P), 1, 2)
-        prior.append(P)
+        priors.append(P)
         gains.append(K)
         keep = np.eye(len(model.F)) - K @ model.H
         P = model.F @ (keep @ P @ _t(keep) + (K * model.R) @ _t(K)) @ model.F.T + Q
-    return FixedFilters(model, np.asarray(q, float), np.array(prior), np.array(gains))
-
-
-def _cycle_start(model: FusionModel, Q: FloatArray, due: np.ndarray) -> FloatArray:
-    """Return the settled prior covariance at step 0 by doubling the map P -> Q + A P (I + G P)^-1 A' of a cycle."""
-    eye = np.eye(len(model.F))
-    cycle = None
-    for used in due:
-        h = model.H[used]
-        G = np.broadcast_to(h.T @ (h / model.R[used, None]), Q.shape)
-        step = (np.broadcast_to(model.F, Q.shape), G, Q)
-        cycle = step if cycle is None else _after(cycle, step, eye)
-    assert cycle is not None
-    for _ in range(_DOUBLINGS):
-        cycle = _after(cycle, cycle, eye)
-    return cycle[2]
-
-
-def _after(
-    first: tuple[FloatArray, FloatArray, FloatArray], then: tuple[FloatArray, FloatArray, FloatArray], eye: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (A, G, Q) of two such maps, one after the other."""
-    (A1, G1, Q1), (A2, G2, Q2) = first, then
-    inverse = np.linalg.inv(eye + Q1 @ G2)
-    A = A2 @ inverse @ A1
-    G = G1 + _t(A1) @ G2 @ inverse @ A1
-    Q = Q2 + A2 @ inverse @ Q1 @ _t(A2)
-    return A, 0.5 * (G + _t(G)), 0.5 * (Q + _t(Q))
+    return FixedFilters(model, q, np.array(priors), np.array(gains))
 
 
 def _t(matrix: FloatArray) -> FloatArray:
@@ -278,7 +289,6 @@ def optimum(
     sample_rate_hz: Mapping[str, float],
     lines: Sequence[tuple[float, float]],
     *,
-    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
 ) -> Optimum:
     r"""Return the fixed filter with the smallest error for a signal made of lines, sensor models exact, after all time
@@ -297,9 +307,6 @@ def optimum(
         Rate of each sensor [Hz].
     lines : sequence of (float, float)
         Frequency [Hz] and amplitude [rad/s] of each line.
-    excess : mapping of str to callable, optional
-        Density of a sensor's reading beyond the belief's white noise (1/f), Hz -> rad^2/s; the filters do not know of
-        it.
     orders : sequence of int, optional
         Orders of the signal model.
 
@@ -308,7 +315,7 @@ def optimum(
     Optimum
         The best filter and its error.
     """
-    return optima(belief, sample_rate_hz, [lines], excess=excess, orders=orders)[0]
+    return optima(belief, sample_rate_hz, [lines], orders=orders)[0]
 
 
 def optima(
@@ -316,14 +323,13 @@ def optima(
     sample_rate_hz: Mapping[str, float],
     signals: Sequence[Sequence[tuple[float, float]]],
     *,
-    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
 ) -> list[Optimum]:
     """Return the `optimum` of each signal; the Riccati equations are solved once for all.
 
     Parameters
     ----------
-    belief, sample_rate_hz, excess, orders : mapping, mapping, mapping, sequence
+    belief, sample_rate_hz, orders : mapping, mapping, sequence
         As for `optimum`.
     signals : sequence of sequence of (float, float)
         Lines of each signal: frequency [Hz] and amplitude [rad/s].
@@ -336,9 +342,7 @@ def optima(
     for order in orders:
         low, high = DECADES[order]
         filters = settled_filters(belief, sample_rate_hz, order=order, q=np.logspace(low, high, high - low + 1))
-        shares = filters.noise_variance() + filters.coloured_variance(
-            [(excess or {}).get(name) for name in sample_rate_hz]
-        )
+        shares = filters.noise_variance()
         lags = filters.line_error(freq, truth) ** 2 * power @ of_signal
         for k, lag in enumerate(lags.T):
             found = _least(filters, order, shares, lag)

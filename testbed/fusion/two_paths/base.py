@@ -80,6 +80,7 @@ class TwoPaths(BlockFilter):
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
     needs_both = True
+    start_leaves = (math.radians(0.05), math.radians(0.1))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters
