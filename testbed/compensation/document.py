@@ -132,10 +132,10 @@ def sealed(document: dict[str, Any]) -> dict[str, Any]:
     document : dict
         Plain lists and numbers.
     """
-    return {**document, "sha256": digest(document)}
+    return {**document, "sha256": seal_of(document)}
 
 
-def digest(document: dict[str, Any]) -> str:
+def seal_of(document: dict[str, Any]) -> str:
     """Return the SHA-256 of a document without its own digest, its keys in order.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.compensation import training
-from testbed.compensation.document import FORMAT, VERSION, ModelDocument, digest, sealed
+from testbed.compensation.document import FORMAT, VERSION, ModelDocument, seal_of, sealed
 from testbed.compensation.features import Features, Scaling
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.polynomial import Polynomial
@@ -130,7 +130,7 @@ class DriftModel:
             range; or if its digest is another, so that it is not as it was written.
         """
         found = ModelDocument.model_validate(document)
-        if digest(document) != found.sha256:
+        if seal_of(document) != found.sha256:
             msg = "drift model: sha256: expected the digest of the rest of the file, got another: it was changed since"
             raise ValueError(msg)
         features: dict[str, Any] = {
