@@ -6,9 +6,7 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
-from testbed.cli.console import terminal
+from testbed.cli.console import ruled, terminal
 from testbed.cli.terminal import step_words
 from testbed.runs.table import rate_text
 
@@ -63,21 +61,18 @@ def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:
 def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = terminal()
-    table = Table(title=f"{scenario.name}: {scenario.file}", title_justify="left")
-    for heading in ("key", "as written", "understood (SI)"):
-        # Folded, never cut: a key is one long word.
-        table.add_column(heading, overflow="fold")
+    keys = ruled("key", "as written", "understood (SI)", title=f"{scenario.name}: {scenario.file}")
     for key, value in understood(scenario).items():
-        table.add_row(key, value["written"], value["si"])
-    console.print(table)
+        keys.add_row(key, value["written"], value["si"])
+    console.print(keys)
     for name, steps in translations(scenario).items():
-        words = Table("data sheet", "as written", "rule", "becomes", title=f"{name}: translated", title_justify="left")
+        words = ruled("data sheet", "as written", "rule", "becomes", title=f"{name}: translated")
         for step in steps:
             words.add_row(step.key, step.written, step.rule, step.becomes)
         console.print(words)
     for name, sensor in scenario.sensors.items():
         if rows := sensor.datasheet():
-            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
+            sheet = ruled("quantity", "value", title=f"{name}: in data-sheet units")
             for row in rows:
                 sheet.add_row(*row)
             console.print(sheet)

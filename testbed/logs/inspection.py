@@ -118,8 +118,9 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
     """
     if clock is not None:
         yield from _of_time(table, clock)
-        if one.rate_hz is not None and not clock.agrees_with(one.rate_hz):
-            yield Finding("rate", f"the nominal rate {one.rate_hz:g} Hz contradicts the stamps: {clock.said()}")
+        nominal = one.rate_hz or one.nominal_hz
+        if nominal is not None and clock.even and not clock.agrees_with(nominal):
+            yield Finding("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
     if values.n_missing:
         yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
     if values.repeats > 1.0:

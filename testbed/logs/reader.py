@@ -200,6 +200,10 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         assert one.rate_hz is not None
         notes += _contradiction(one, clock)
         stamps, clock = None, None
+    elif clock is not None and one.nominal_hz is not None and clock.even and not clock.agrees_with(one.nominal_hz):
+        notes.append(
+            f"contradiction: the file says {one.nominal_hz:g} Hz, its stamps {clock.said()}; the stamps are used"
+        )
     rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
     si = _in_si(numbers, one)
     return LogChannel(

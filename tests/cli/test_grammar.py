@@ -89,6 +89,24 @@ def test_list_says_the_whole_summary_on_a_narrow_terminal(monkeypatch, capsys):
             assert summary in words
 
 
+def test_a_table_is_folded_or_shortened_on_a_narrow_terminal_never_cut(tmp_path, monkeypatch, capsys, rng):
+    from rich.console import Console
+
+    monkeypatch.chdir(tmp_path)
+    for module in ("allan", "recordings", "understood"):
+        monkeypatch.setattr(f"testbed.cli.{module}.terminal", lambda: Console(width=80, markup=False))
+    np.savetxt("a_long_name.csv", rng.standard_normal(5_000), header="a_long_name_of_a_channel [deg/s]", comments="")
+    for words in (
+        ("allan", "a_long_name.csv", "--rate", "100"),
+        ("log", "inspect", "a_long_name.csv"),
+        ("check", short_file(tmp_path)),
+    ):
+        status, out, _ = say(*words, monkeypatch=monkeypatch, capsys=capsys)
+        assert status == 0
+        assert "…" not in out
+        assert max(len(line) for line in out.splitlines() if "│" in line) <= 80
+
+
 def test_version_is_that_of_the_package(spoken):
     assert spoken("--version") == (0, f"testbed {testbed.__version__}\n", "")
 
