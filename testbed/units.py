@@ -76,6 +76,8 @@ farad = ampere * second / volt = F
 
 # Spellings of data sheets: the degree sign, the ordinal sign that looks like it, the root sign.
 _SPELLINGS = ((re.compile(r"[°º]"), "deg"), (re.compile(r"√\s*(\w+)"), r"sqrt(\1)"), (re.compile(r"√\s*\("), "sqrt("))
+# Beyond these, in SI, no quantity of an experiment lies, and its square would overflow or vanish.
+LEAST, MOST = 1e-30, 1e30
 _ICE_POINT = Decimal("273.15")
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:inf|nan)\w*)\s*(.*)", re.IGNORECASE | re.DOTALL
@@ -269,6 +271,7 @@ class Quantity:
 
     def _bound(self, si: float, value: Any) -> None:
         checks = (
+            (si != 0.0 and not LEAST <= abs(si) <= MOST, f"0, or a magnitude of {LEAST:g} to {MOST:g}"),
             (self.above is not None and si <= (self.above or 0.0), f"more than {self.above}"),
             (self.at_least is not None and si < (self.at_least or 0.0), f"at least {self.at_least}"),
             (self.at_most is not None and si > (self.at_most or 0.0), f"at most {self.at_most}"),
@@ -303,6 +306,8 @@ Current = Annotated[float, Quantity("A", "2 A", at_least=0.0)]
 Duration = Annotated[float, Quantity("s", "20 s", at_least=0.0)]
 PositiveDuration = Annotated[float, Quantity("s", "20 s", above=0.0)]
 Frequency = Annotated[float, Quantity("Hz", "10 Hz", above=0.0)]
+# Some minutes between two readings, up to the base clock.
+SampleRate = Annotated[float, Quantity("Hz", "2 kHz", at_least=0.005, at_most=20_000.0)]
 Length = Annotated[float, Quantity("m", "15 mm", above=0.0)]
 Position = Annotated[float, Quantity("m", "15 mm")]
 Mass = Annotated[float, Quantity("kg", "20 kg", above=0.0)]

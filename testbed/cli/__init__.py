@@ -13,8 +13,9 @@ One grammar for every command, ``testbed COMMAND ARGUMENT [--option VALUE]``:
 - Exit status: 0 done, 1 an expectation was missed or a leak found, 2 bad input, 3 the run failed, 4 a fault of ours,
   130 interrupted.
 
-A command is a function in `testbed.cli.commands` and a line in `testbed.cli.app`: its docstring is the summary, one
-finished sentence; `expanded` gives it the shared options; heavy libraries are imported inside.
+docs/commands.md has the documents of ``--json``. A command is a function in `testbed.cli.commands` and a line in
+`testbed.cli.app`: its docstring is the summary, one finished sentence; `expanded` gives it the shared options; heavy
+libraries are imported inside.
 """
 
 from testbed.cli.entry import main

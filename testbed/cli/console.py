@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rich.console import Console
+from rich.table import Column, Table
 
 
 def terminal() -> Console:
@@ -10,3 +11,8 @@ def terminal() -> Console:
     console = Console(markup=False, highlight=False)
     # Without a terminal there is no width to respect: a log keeps whole lines.
     return console if console.is_terminal else Console(markup=False, highlight=False, width=180)
+
+
+def ruled(*headings: str, title: str | None = None) -> Table:
+    """Return an empty table whose cells are folded where the terminal is narrow, never cut."""
+    return Table(*(Column(heading, overflow="fold") for heading in headings), title=title, title_justify="left")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
-from testbed.cli.console import terminal
+from testbed.cli.console import ruled, terminal
 from testbed.drift.summary import LETTERS, audit_summary
 from testbed.pages.numbers import significant
 
@@ -45,7 +43,7 @@ def print_audit(audited: Audited, folder: Path) -> None:
         Where its page is.
     """
     console, figures = terminal(), audit_summary(audited.audit)
-    table = Table("", "100 s std", "sigma 1 h", *LETTERS, title=f"{audited.thermal.name}: {audited.method}")
+    table = ruled("", "100 s std", "sigma 1 h", *LETTERS, title=f"{audited.thermal.name}: {audited.method}")
     names = {"before": "record", "after": "compensated", "low_passed": "equal low-pass", "oracle": "oracle"}
     for key, label in names.items():
         if figures[key] is not None:

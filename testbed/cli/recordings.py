@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table as Grid
+from rich.measure import Measurement
 
-from testbed.cli.console import terminal
+from testbed.cli.console import ruled, terminal
 from testbed.logs.inspection import report_data
 from testbed.logs.proposal import map_data
 from testbed.units import DEG
@@ -15,6 +15,8 @@ from testbed.units import DEG
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from rich.table import Table as Grid
 
     from testbed.judging.density import RateDensityEstimate
     from testbed.logs.clock import TimeBase
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 40
+_LEAST, _FRAME = 8, 3  # bars that show something; the frame of a column
 
 
 def document(table: Table, reports: Sequence[Report], proposed: Proposal) -> dict[str, Any]:
@@ -44,14 +47,9 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
     """Print what a recording holds, a row for each channel, then what is wrong and what is open."""
     out = terminal()
     out.print(f"{table.path}: {table.format}", soft_wrap=True)
-    grid = Grid("channel", "unit", "samples", "mean", "std", "lowest", "highest", "word", "outline")
-    for report in reports:
-        values = report.values
-        numbers = (values.mean, values.std, values.low, values.high)
-        word = f"{values.word:.3g}" if values.word else "-"
-        unit = report.plan.unit or "?"
-        grid.add_row(report.plan.name, unit, str(values.n_time), *(f"{n:.4g}" for n in numbers), word, outline(values))
-    out.print(grid)
+    # The outline takes what room there is beside the numbers.
+    room = out.width - Measurement.get(out, out.options.update(width=1000), _grid(reports, 0)).maximum - _FRAME
+    out.print(_grid(reports, max(0, min(_WIDTH, room)) if room >= _LEAST else 0))
     for name, clock in _clocks(reports).items():
         out.print(f"time {name}: {_time(clock)}", soft_wrap=True)
     lines = [note for report in reports for note in report.plan.notes]
@@ -59,6 +57,21 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
     lines += [*table.notes, *(f"to be said: {text}" for text in proposed.open)]
     for line in dict.fromkeys(lines):
         out.print(line, soft_wrap=True)
+
+
+def _grid(reports: Sequence[Report], bars: int) -> Grid:
+    """Return the table of the channels, each with an outline of so many bars."""
+    headings = ("channel", "unit", "samples", "mean", "std", "lowest", "highest", "word")
+    grid = ruled(*headings, *(["outline"] if bars else []))
+    for column in grid.columns[1:]:
+        column.no_wrap = True  # a number in two lines is none
+    for report in reports:
+        values = report.values
+        numbers = (values.mean, values.std, values.low, values.high)
+        word = f"{values.word:.3g}" if values.word else "-"
+        cells = (report.plan.name, report.plan.unit or "?", str(values.n_time), *(f"{n:.4g}" for n in numbers), word)
+        grid.add_row(*cells, *([outline(values, bars)] if bars else []))
+    return grid
 
 
 def _clocks(reports: Sequence[Report]) -> dict[str, TimeBase]:
@@ -79,12 +92,12 @@ def _time(clock: TimeBase) -> str:
     return "; ".join(parts)
 
 
-def outline(values: Values) -> str:
-    """Return a small plot of a channel: the highest value of each stretch of the record, as bars."""
+def outline(values: Values, bars: int) -> str:
+    """Return a small plot of a channel: the highest value of each stretch of the record, as so many bars."""
     rows = values.outline
     if not rows.size or not values.high > values.low:
         return ""
-    places = np.array_split(np.arange(len(rows)), min(_WIDTH, len(rows)))
+    places = np.array_split(np.arange(len(rows)), min(bars, len(rows)))
     tops = np.array([rows[place, 1].max() for place in places])
     levels = np.rint((tops - values.low) / (values.high - values.low) * (len(_BARS) - 1)).astype(int)
     return "".join(_BARS[level] for level in levels)
@@ -95,7 +108,7 @@ def print_densities(found: Sequence[RateDensityEstimate], edges: list[float] | N
     out = terminal()
     for one in found:
         out.print(one.record.content, style="bold", soft_wrap=True)
-        grid = Grid("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
+        grid = ruled("band [Hz]", "rate rms [deg/s]", "angle rms [urad]", "up to here [deg/s]", "up to here [urad]")
         rate = angle = 0.0
         for band in one.bands(edges or one.decades()):
             rate, angle = float(np.hypot(rate, band.rate)), float(np.hypot(angle, band.angle))

@@ -9,7 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from testbed.cli.console import terminal
-from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number
+from testbed.pages.numbers import bounded
+from testbed.pages.palette import color_of
+from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number, rate_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -20,22 +22,27 @@ if TYPE_CHECKING:
     from testbed.runs.metrics import Budget, LineMetrics, RunMetrics, SourceMetrics, TurntableMetrics
 
 # Columns of the terminal: errors of a filter beside its name, and gain, phase and error over optimum of one line.
-_TABLE_WIDTH, _LINE_WIDTH = 61, 31
+_TABLE_WIDTH, _LINE_WIDTH = 61, 46
 
 
 def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     """Print the table of errors, the expectations and what was written."""
     console = terminal()
-    _, scale = error_unit(metrics)
+    unit = error_unit(metrics)
     lines = metrics.line_freq_hz
     # With many lines, or on a narrow terminal, the table would not fit: the report has them all.
     longest = max(map(len, metrics.sources), default=0)
     width = _TABLE_WIDTH + longest + _LINE_WIDTH * len(lines)
     shown = lines if len(lines) <= 4 and console.width >= width else []
-    headings = ("", *HEADINGS, *(f"{line:g} Hz gain, phase, x opt." for line in shown))
+    optimum = any(line.optimum_deg_s for source in metrics.fusion.values() for line in source.lines or [])
+    what = "gain, phase, x opt." if optimum else "gain, phase"
+    headings = ("", *HEADINGS, *(f"{line:g} Hz {what}" for line in shown))
     rows = [
-        [[name, *error_cells(source, scale), *_line_cells(source, shown)] for name, source in kind.items()]
-        for kind in (metrics.sensors, metrics.fusion)
+        [
+            [f"{kind}/{name}", *error_cells(source, unit[1]), *_line_cells(source, shown)]
+            for name, source in found.items()
+        ]
+        for kind, found in (("sensors", metrics.sensors), ("fusion", metrics.fusion))
     ]
     # Not the table's own title, which would be folded to a narrow table's width.
     console.print(error_title(metrics), soft_wrap=True, style="italic")
@@ -43,32 +50,34 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for name, source in metrics.sensors.items():
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
-    for line in _start_and_gates(metrics):
-        console.print(line, soft_wrap=True, highlight=False)
-    _print_budget(console, metrics.budget)
+    for words in _start_and_gates(metrics):
+        console.print(words, soft_wrap=True, highlight=False)
+    _print_bounds(console, metrics, unit)
+    _print_budget(console, metrics.budget, unit)
     _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
-    _print_table(console, metrics.turntable)
+    _print_table(console, metrics.turntable, unit)
     for bound in metrics.expectations:
         verdict = Text("met", "green") if bound.met else Text("MISSED", "red")
         console.print(f"expected {bound.subject} {bound.metric} {bound.bound}: {number(bound.value)}", verdict)
-    console.print(f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml", soft_wrap=True)
+    console.print(
+        f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml, manifest.json",
+        soft_wrap=True,
+    )
 
 
 def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
-    """Yield what the filters knew of the start, what their front part struck out, and why there are no bounds."""
+    """Yield what the filters knew of the start, and what their front part struck out."""
     for start, words in (("rest", "knew that the table rests at t = 0"), ("unknown", "knew nothing of the start")):
         if names := [name for name, source in metrics.fusion.items() if source.start == start]:
             yield f"start: {', '.join(names)} {words}"
     for name, source in metrics.fusion.items():
         if gated := {sensor: n for sensor, n in (source.gated or {}).items() if n}:
             yield f"{name}: struck out {', '.join(f'{n} readings of {sensor}' for sensor, n in gated.items())}"
-    for reason in dict.fromkeys(source.no_bound for source in metrics.fusion.values() if source.no_bound):
-        yield f"no floor or optimum: {reason}"
 
 
 def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list[list[str]]]) -> None:
-    """Print the columns that have a value, a line under each kind of source."""
+    """Print the columns that have a value, a line under each kind of source, names in the colour of their signal."""
     cells = [row for kind in rows for row in kind]
     table = Table()
     kept = [i for i in range(len(headings)) if i < 2 or any(row[i] != NOTHING for row in cells)]
@@ -76,7 +85,8 @@ def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list
         table.add_column(headings[i], justify="right" if i else "left", no_wrap=True)
     for kind in rows:
         for row in kind:
-            table.add_row(*(row[i] for i in kept), end_section=row is kind[-1])
+            name = Text(row[0].split("/", maxsplit=1)[1], style=color_of(row[0]))
+            table.add_row(name, *(row[i] for i in kept[1:]), end_section=row is kind[-1])
     console.print(table)
 
 
@@ -96,15 +106,16 @@ def _print_claims(console: Console, fusion: Mapping[str, SourceMetrics]) -> None
         if claim.verdict is not None
     ]
     if words:
-        console.print(f"claims: {', '.join(words)}", soft_wrap=True)
+        meaning = "NEES: mean of error squared over the variance that the filter claims, 1 if the claim holds"
+        console.print(f"claims: {', '.join(words)}; {meaning}", soft_wrap=True)
 
 
-def _print_table(console: Console, table: TurntableMetrics | None) -> None:
+def _print_table(console: Console, table: TurntableMetrics | None, unit: tuple[str, float]) -> None:
     """Print how the turntable did."""
     if table is None:
         return
     followed = ", ".join(
-        f"{name} {number(rms)} deg/s rms{_gain(lines)}"
+        f"{name} {rate_text(rms, unit)} rms{_gain(lines)}"
         for name, rms, lines in (
             ("encoder", table.command_to_encoder_rms_deg_s, table.command_to_encoder_lines),
             ("inertial", table.command_to_inertial_rms_deg_s, table.command_to_inertial_lines),
@@ -113,7 +124,7 @@ def _print_table(console: Console, table: TurntableMetrics | None) -> None:
     torque = f"peak torque {number(table.peak_torque_nm)} N m"
     if table.torque_limit_nm is not None and table.torque_margin is not None:
         torque += f" of {number(table.torque_limit_nm)} N m, margin {100 * table.torque_margin:.0f} %"
-    noise = f"arithmetic noise of the truth {number(table.truth_noise_deg_s)} deg/s"
+    noise = f"arithmetic noise of the truth {rate_text(table.truth_noise_deg_s, unit)}"
     step = step_words(table.engine, table.step_s, table.step_factor, table.step_error)
     console.print(f"turntable: command to {followed}; {torque}; {noise}; {step}", soft_wrap=True)
 
@@ -149,10 +160,26 @@ def _line_cell(line: LineMetrics) -> str:
     if line.gain is None:
         return NOTHING
     over = f", {line.error_deg_s / line.optimum_deg_s:.1f}" if line.error_deg_s and line.optimum_deg_s else ""
-    return f"{line.gain:.4f}, {line.phase_deg:+.2f} deg{over}"
+    lost = line.phase_ci95_deg is not None and line.phase_ci95_deg >= 90.0
+    phase = "phase lost" if lost else f"{bounded(line.phase_deg, line.phase_ci95_deg)} deg"
+    return f"{bounded(line.gain, line.gain_ci95)}, {phase}{over}".replace("−", "-")
 
 
-def _print_budget(console: Console, budget: Budget | None) -> None:
+def _print_bounds(console: Console, metrics: RunMetrics, unit: tuple[str, float]) -> None:
+    """Print what nothing gets below, or why there is nothing."""
+    for source in [*metrics.fusion.values()][:1]:
+        bounds = {
+            "floor": source.floor_rmse_deg_s,
+            "floor with the prior": source.prior_floor_rmse_deg_s,
+            "optimum over this run": source.optimum_rmse_deg_s,
+            "settled": source.optimum_settled_deg_s,
+        }
+        known = ", ".join(f"{name} {rate_text(value, unit)}" for name, value in bounds.items() if value is not None)
+        reason = f"none {'else ' if known else ''}since {metrics.bounds_reason}" if metrics.bounds_reason else ""
+        console.print(f"bounds: {'; '.join(filter(None, (known, reason)))}", soft_wrap=True, highlight=False)
+
+
+def _print_budget(console: Console, budget: Budget | None, unit: tuple[str, float]) -> None:
     """Print in one line which sensor makes the noise floor, and where the better sensor changes."""
     if budget is None:
         return
@@ -160,7 +187,8 @@ def _print_budget(console: Console, budget: Budget | None) -> None:
     for name in budget.densities:
         variance = [band.sensors_deg_s[name] ** 2 for band in budget.bands]
         most = budget.bands[variance.index(max(variance))]
-        parts.append(f"{name} {number(math.sqrt(sum(variance)))} deg/s (most at {most.low_hz:g}-{most.high_hz:g} Hz)")
+        whole = rate_text(math.sqrt(sum(variance)), unit)
+        parts.append(f"{name} {whole} (most at {most.low_hz:g}-{most.high_hz:g} Hz)")
     crossed = ", ".join(number(freq) for freq in budget.crossovers_hz)
     where = f"crossover {crossed} Hz; " if crossed else ""
     console.print(f"noise floor: {where}{', '.join(parts)}", soft_wrap=True)

@@ -6,11 +6,9 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
-from testbed.cli.console import terminal
+from testbed.cli.console import ruled, terminal
 from testbed.cli.terminal import step_words
-from testbed.runs.table import number
+from testbed.runs.table import rate_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,21 +61,18 @@ def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:
 def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     """Print every key of a scenario: as written, and in SI; then what the turntable will be asked for."""
     console = terminal()
-    table = Table(title=f"{scenario.name}: {scenario.file}", title_justify="left")
-    for heading in ("key", "as written", "understood (SI)"):
-        # Folded, never cut: a key is one long word.
-        table.add_column(heading, overflow="fold")
+    keys = ruled("key", "as written", "understood (SI)", title=f"{scenario.name}: {scenario.file}")
     for key, value in understood(scenario).items():
-        table.add_row(key, value["written"], value["si"])
-    console.print(table)
+        keys.add_row(key, value["written"], value["si"])
+    console.print(keys)
     for name, steps in translations(scenario).items():
-        words = Table("data sheet", "as written", "rule", "becomes", title=f"{name}: translated", title_justify="left")
+        words = ruled("data sheet", "as written", "rule", "becomes", title=f"{name}: translated")
         for step in steps:
             words.add_row(step.key, step.written, step.rule, step.becomes)
         console.print(words)
     for name, sensor in scenario.sensors.items():
         if rows := sensor.datasheet():
-            sheet = Table("quantity", "value", title=f"{name}: in data-sheet units", title_justify="left")
+            sheet = ruled("quantity", "value", title=f"{name}: in data-sheet units")
             for row in rows:
                 sheet.add_row(*row)
             console.print(sheet)
@@ -91,7 +86,7 @@ def _print_facts(console: Console, facts: TableFacts) -> None:
     if facts.torque_limit is not None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
-    noise = f"arithmetic noise of the truth {number(math.degrees(facts.truth_noise))} deg/s rms"
+    noise = f"arithmetic noise of the truth {rate_text(math.degrees(facts.truth_noise), ('deg/s', 1.0))} rms"
     step = step_words(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:

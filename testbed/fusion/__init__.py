@@ -61,8 +61,8 @@ def estimate(
     sample_rate_hz : mapping of str to float
         Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
     belief : mapping or str, optional
-        What the filter believes about each sensor, or the name of a shipped belief; default equation (39) with the
-        presets' noise.
+        What the filter believes about each sensor, such as ``{"mhd_ars": testbed.belief_of("mhd03")}``, or the name of
+        a shipped belief; default equation (39) with the presets' noise. "exact" is refused: arrays are no simulation.
     plugins : iterable of str, optional
         Modules that are loaded first, dotted or as paths of ``.py`` files, besides those of ``TESTBED_PLUGINS``.
     **parameters : Any

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
 
 Coefficient = Annotated[float, Field(allow_inf_nan=False)]
+Coefficients = Annotated[tuple[Coefficient, ...], Field(max_length=33)]
 
 _CLOSEST_POLES = 1e-3
 
@@ -84,8 +85,8 @@ class SensorBelief(Part):
         Where it is from, as shown beside results: the name of a shipped belief, "exact" or "given". It changes nothing.
     """
 
-    numerator: tuple[Coefficient, ...]
-    denominator: tuple[Coefficient, ...]
+    numerator: Coefficients
+    denominator: Coefficients
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
     noise_knee: Frequency | None = None
@@ -111,6 +112,13 @@ class SensorBelief(Part):
     def sees_constant(self) -> bool:
         """Whether a constant rate shows in the reading at all."""
         return self.numerator[-1] != 0.0
+
+    @property
+    def walks(self) -> bool:
+        """Whether its rate random walk counts above the lowest frequency, so that it is a state of its own."""
+        lowest = 2.0 * np.pi * self.lowest_frequency
+        beside = self.input_noise**2 + self.bias_instability**2 / lowest
+        return bool(self.rate_random_walk**2 > 0.03 * beside * lowest**2)
 
     def inner_slow_density(self, freq_hz: FloatArray) -> FloatArray:
         """Return the density of the 1/f noise that passes the dynamics [rad^2/s], at frequencies above zero [Hz]."""

@@ -81,6 +81,16 @@ class FusionModel:
     n_slow: int
     owners: NDArray[np.int64]
 
+    @property
+    def cycle(self) -> int:
+        """Number of steps after which the pattern of the readings repeats."""
+        return math.lcm(*self.strides)
+
+    @property
+    def due(self) -> NDArray[np.bool_]:
+        """Which sensor has a reading at each step of that pattern, shape (n_step, n_sensor)."""
+        return np.array([[p % stride == 0 for stride in self.strides] for p in range(self.cycle)])
+
 
 def build_model(
     belief: Mapping[str, SensorBelief],

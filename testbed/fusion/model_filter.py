@@ -10,7 +10,7 @@ from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer,
 from testbed.fusion.base import BlockFilter, CommonParameters, Switch
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
-from testbed.units import Quantity
+from testbed.units import DEG, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -131,6 +131,8 @@ class ModelFilter(BlockFilter):
     ValueError
         If a sensor has no belief, a rate does not divide the fastest one, or a parameter names an unknown sensor.
     """
+
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: FilterParameters

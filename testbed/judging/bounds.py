@@ -1,92 +1,32 @@
-"""What no filter gets below in a run: the noise floor, and the optimum settled and from the run's own start."""
+"""What nothing gets below in a run: the noise floor, the optimum of its signal, and why where there is none."""
 
 from __future__ import annotations
 
-import functools
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.fusion.analysis.optimum import Optimum, optima, variance_from_start
+from testbed.fusion.analysis.bounds import never_settles, run_bounds, settled_bounds
 from testbed.metrics.errors import floor_rmse
 from testbed.scenario.beliefs import believed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from testbed.fusion.analysis.bounds import SignalBound
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.start import StartKind
     from testbed.sensors.base import Sensor
+    from testbed.signals import FloatArray
 
-BLIND = "no sensor sees a constant rate: the error of any filter grows without bound"
-SILENT = "a sensor without noise has no bound"
-NO_MODEL = "a sensor has no rational model"
-# A response this small against its largest, at a frequency this low [Hz], sees no constant.
-_LEAST_RESPONSE, _CONSTANT_HZ = 1e-3, 1e-9
-# Instants between settle and the end at which the optimum from the start is taken.
-_INSTANTS = 9
+    Density = Callable[[FloatArray], FloatArray]
+
+# A sensor that is blind at zero falls by ten from the first to the second.
+_NEAR_ZERO_HZ = np.array([1e-5, 1e-6])
 
 
-@dataclass(frozen=True)
 class Bounds:
-    """Bounds of a run [rad/s], None where there is none, and why.
-
-    Parameters
-    ----------
-    floor, prior_floor : float or None
-        Noise of the best combination of the sensors, over the whole bandwidth and from `no_rate_below` on.
-    best : tuple of Optimum
-        Of the whole signal, then of each of its lines, settled; empty without lines.
-    reason : str or None
-        Why there are no bounds.
-    belief, sample_rate_hz : mapping
-        What the optimum knows: the simulated sensors exactly.
-    """
-
-    floor: float | None = None
-    prior_floor: float | None = None
-    best: tuple[Optimum, ...] = ()
-    reason: str | None = None
-    belief: Mapping[str, SensorBelief] = field(default_factory=dict)
-    sample_rate_hz: Mapping[str, float] = field(default_factory=dict)
-
-    def from_start(self, start: StartKind, settle: float, duration: float) -> float | None:
-        """Return what the optimum leaves between two times after a start [rad/s], root mean square.
-
-        The noise part by the Riccati recursion of the best settled filter from P0, the lag as settled.
-
-        Parameters
-        ----------
-        start : {"unknown", "rest"}
-            What is known before the first reading.
-        settle, duration : float
-            When to begin and to end [s].
-        """
-        if not self.best:
-            return None
-        best = self.best[0]
-        variance = variance_from_start(
-            self.belief,
-            self.sample_rate_hz,
-            order=best.order,
-            q=best.q,
-            start=start,
-            times=np.linspace(settle, duration, _INSTANTS).tolist(),
-        )
-        mean = float(np.trapezoid(variance) / (_INSTANTS - 1))
-        return float(np.sqrt(max(mean - best.claimed**2 + best.rmse**2, 0.0)))
-
-
-def bounds_of(
-    sensors: Mapping[str, Sensor],
-    sample_rate_hz: Mapping[str, float],
-    signals: Sequence[Sequence[tuple[float, float]]],
-    *,
-    bandwidth: float,
-    no_rate_below: float | None = None,
-) -> Bounds:
-    """Return the bounds of a run.
+    """The bounds of the sensors of a run.
 
     Parameters
     ----------
@@ -94,41 +34,98 @@ def bounds_of(
         The instruments.
     sample_rate_hz : mapping of str to float
         Rate of each [Hz].
-    signals : sequence of sequence of (float, float)
-        Frequency [Hz] and amplitude [rad/s] of the lines of the whole signal, then of others, such as each line alone.
-    bandwidth : float
-        W of the floor [Hz].
-    no_rate_below : float, optional
-        Where the rate is known to have nothing below [Hz].
     """
-    if not sensors or not all(sensor.noise for sensor in sensors.values()):
-        return Bounds(reason=SILENT if sensors else None)
-    psds = [sensor.input_noise_psd for sensor in sensors.values()]
-    prior = None if no_rate_below is None else floor_rmse(psds, bandwidth, no_rate_below)
-    if not any(sees_constant(sensor) for sensor in sensors.values()):
-        return Bounds(prior_floor=prior, reason=BLIND)
-    floor = floor_rmse(psds, bandwidth)
-    belief = {name: one for name, sensor in sensors.items() if (one := believed(sensor)) is not None}
-    if len(belief) < len(sensors):
-        return Bounds(floor, prior, reason=NO_MODEL)
-    best: tuple[Optimum, ...] = ()
-    if signals:
-        lines = tuple(tuple(tuple(line) for line in signal) for signal in signals)
-        best = _remembered(tuple(belief.items()), tuple(sample_rate_hz.items()), lines)
-    return Bounds(floor, prior, best, None, belief, dict(sample_rate_hz))
+
+    def __init__(self, sensors: Mapping[str, Sensor], sample_rate_hz: Mapping[str, float]) -> None:
+        self._sensors, self._rates = sensors, {name: sample_rate_hz[name] for name in sensors}
+
+    @property
+    def densities(self) -> dict[str, Density]:
+        """Input-referred noise density of each sensor, Hz -> rad^2/s."""
+        return {name: sensor.input_noise_psd for name, sensor in self._sensors.items()}
+
+    @property
+    def reason(self) -> str | None:
+        """Why there is no floor and no optimum, None if there are."""
+        silent = [name for name, sensor in self._sensors.items() if not sensor.noise]
+        if not self._sensors or silent:
+            return f"the noise of {', '.join(silent)} is off" if silent else "there is no sensor"
+        if not any(sees_constant(sensor) for sensor in self._sensors.values()):
+            return "no sensor sees a constant rate, so that the error of an unknown signal has no bound"
+        return None
+
+    def floor(self, bandwidth_hz: float) -> float | None:
+        """Return the noise that no filter of an unknown signal gets below [rad/s], None for `reason`.
+
+        Parameters
+        ----------
+        bandwidth_hz : float
+            W [Hz].
+        """
+        return None if self.reason else floor_rmse(list(self.densities.values()), bandwidth_hz)
+
+    def prior_floor(self, bandwidth_hz: float, no_rate_below_hz: float | None) -> float | None:
+        """Return the floor for a signal that is known to have no rate below a frequency [rad/s], None without one.
+
+        Parameters
+        ----------
+        bandwidth_hz, no_rate_below_hz : float, float or None
+            End and beginning of the band [Hz].
+        """
+        if no_rate_below_hz is None or not all(sensor.noise for sensor in self._sensors.values()):
+            return None
+        return floor_rmse(list(self.densities.values()), bandwidth_hz, no_rate_below_hz)
+
+    def settled(self, signals: Sequence[Sequence[tuple[float, float]]]) -> tuple[list[SignalBound] | None, str | None]:
+        """Return the optimum of each signal after all time constants, or None and why.
+
+        Parameters
+        ----------
+        signals : sequence of sequence of (float, float)
+            Lines of each: frequency [Hz] and amplitude [rad/s].
+        """
+        belief, why = self._exact()
+        if belief is None or (why := never_settles(belief)):
+            return None, why
+        return settled_bounds(belief, self._rates, signals), None
+
+    def of_run(
+        self, signals: Sequence[Sequence[tuple[float, float]]], start: StartKind, window: tuple[float, float]
+    ) -> tuple[list[SignalBound] | None, str | None]:
+        """Return the optimum of each signal over a window of a run from its start, or None and why.
+
+        Parameters
+        ----------
+        signals : sequence of sequence of (float, float)
+            As for `settled`.
+        start : {"unknown", "rest"}
+            What is known at t = 0.
+        window : tuple of float
+            Begin and end [s].
+        """
+        belief, why = self._exact()
+        return (
+            (None, why)
+            if belief is None
+            else (run_bounds(belief, self._rates, signals, start=start, window=window), None)
+        )
+
+    def _exact(self) -> tuple[dict[str, SensorBelief] | None, str | None]:
+        if self.reason:
+            return None, self.reason
+        found = {name: believed(sensor) for name, sensor in self._sensors.items()}
+        known = {name: one for name, one in found.items() if one is not None and one.output_noise > 0.0}
+        missing = [name for name in found if name not in known]
+        return (None, f"no rational model meets {', '.join(missing)}") if missing else (known, None)
 
 
 def sees_constant(sensor: Sensor) -> bool:
-    """Return whether a constant rate shows in the readings of a sensor."""
-    response = np.abs(sensor.response(np.array([_CONSTANT_HZ, 1.0, 10.0, 100.0])))
-    return bool(response[0] > _LEAST_RESPONSE * response.max())
+    """Return whether a constant rate shows in the readings of an instrument.
 
-
-@functools.lru_cache(maxsize=32)
-def _remembered(
-    belief: tuple[tuple[str, SensorBelief], ...],
-    sample_rate_hz: tuple[tuple[str, float], ...],
-    signals: tuple[tuple[tuple[float, float], ...], ...],
-) -> tuple[Optimum, ...]:
-    # The search takes a second, and sweeps over seeds ask for the same.
-    return tuple(optima(dict(belief), dict(sample_rate_hz), signals, coloured=True))
+    Parameters
+    ----------
+    sensor : Sensor
+        The instrument.
+    """
+    near, nearer = np.abs(sensor.response(_NEAR_ZERO_HZ))
+    return bool(nearer > 0.5 * near)

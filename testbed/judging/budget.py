@@ -1,4 +1,4 @@
-"""Who sees what: the crossover of the sensors, their share in the noise floor by band, and the optimum of a signal."""
+"""Who sees what: the crossover of the sensors and their share in the noise floor by band."""
 
 from __future__ import annotations
 
@@ -7,14 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.fusion.analysis.optimum import Optimum, optima
-from testbed.scenario.beliefs import believed
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from testbed.fusion.belief import SensorBelief
-    from testbed.sensors.base import Sensor
     from testbed.signals import FloatArray
 
 # Where the first band of a budget begins, as the integral of the floor does.
@@ -127,55 +122,3 @@ def _all_crossovers(psds: Mapping[str, Callable[[FloatArray], FloatArray]], band
             if here[first] <= 1.01 * min(here.values()):
                 found.append(float(freq))
     return sorted(found)
-
-
-def signal_optimum(
-    sensors: Mapping[str, Sensor],
-    sample_rate_hz: Mapping[str, float],
-    lines: Sequence[tuple[float, float]],
-    *,
-    coloured: bool = False,
-) -> Optimum | None:
-    """Return the best settled filter of a signal for these very sensors, None if one of them has no rational model.
-
-    With slow noise (1/f) it is what is left after hours; a short run from a known rest may stay below it
-    (`testbed.judging.bounds`).
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-        The instruments.
-    sample_rate_hz : mapping of str to float
-        Rate of each [Hz].
-    lines : sequence of (float, float)
-        Frequency [Hz] and amplitude [rad/s] of each line of the signal.
-    coloured : bool, optional
-        Count the sensors' slow noise too, which the filters then know of; white noise alone bounds no real record.
-    """
-    found = signal_optima(sensors, sample_rate_hz, [lines], coloured=coloured)
-    return None if found is None else found[0]
-
-
-def signal_optima(
-    sensors: Mapping[str, Sensor],
-    sample_rate_hz: Mapping[str, float],
-    signals: Sequence[Sequence[tuple[float, float]]],
-    *,
-    coloured: bool = False,
-) -> list[Optimum] | None:
-    """Return the `signal_optimum` of each of several signals, None if a sensor has no rational model.
-
-    Parameters
-    ----------
-    sensors, sample_rate_hz, coloured : mapping, mapping, bool
-        As for `signal_optimum`.
-    signals : sequence of sequence of (float, float)
-        Lines of each signal: frequency [Hz] and amplitude [rad/s].
-    """
-    belief: dict[str, SensorBelief] = {}
-    for name, sensor in sensors.items():
-        one = believed(sensor)
-        if one is None:
-            return None
-        belief[name] = one
-    return optima(belief, sample_rate_hz, signals, coloured=coloured)

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.belief import declared
+from testbed.judging.bounds import Bounds
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density
 from testbed.runs.block import first_due
 from testbed.runs.metrics import RunMetrics
+from testbed.scenario.departures import departures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from testbed.judging.bounds import Bounds
+    from testbed.fusion.start import StartKind
     from testbed.runs.block import RunBlock
     from testbed.scenario.model import Scenario
     from testbed.scenario.step_choice import StepChoice
@@ -40,8 +42,9 @@ class Judge:
         self._scenario = scenario
         self._rates = rates
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
-        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True) for name in scenario.sensors}
-        self._errors |= {name: ErrorMetrics(scenario.lines) for name in scenario.fusion}
+        span = (scenario.frame.settle, scenario.frame.duration)
+        self._errors = {name: ErrorMetrics(scenario.lines, gaps=True, span=span) for name in scenario.sensors}
+        self._errors |= {name: ErrorMetrics(scenario.lines, span=span) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
         self._table = TableMetrics(scenario, step)
@@ -77,31 +80,30 @@ class Judge:
             Of what the result depends on, to be noted with it.
         """
         frame = self._scenario.frame
-        psds = {name: sensor.input_noise_psd for name, sensor in self._scenario.sensors.items() if sensor.noise}
-        bounds, moving = self._bounds()
-        floor = bounds.floor
-        optimum_settled = bounds.best[0].rmse if bounds.best else None
-        of_lines = {freq: float(np.rad2deg(one.rmse)) for (freq, _), one in zip(moving, bounds.best[1:], strict=False)}
+        bounds = Bounds(self._scenario.sensors, self._rates)
+        floors = {
+            "floor_rmse_deg_s": in_deg(bounds.floor(frame.bandwidth)),
+            "prior_floor_rmse_deg_s": in_deg(bounds.prior_floor(frame.bandwidth, frame.no_rate_below)),
+        }
+        settled, why = self._settled(bounds)
+        psds = {} if bounds.reason else bounds.densities
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
                 "belief": declared(spec.belief),
-                **self._errors[name].result(),
-                **self._errors[name].consistency(),
                 "start": getattr(spec.parameters, "start", None),
                 "gated": self._gated.get(name),
-                "floor_rmse_deg_s": degrees(floor),
-                "prior_floor_rmse_deg_s": degrees(bounds.prior_floor),
-                "optimum_rmse_deg_s": degrees(
-                    bounds.from_start(getattr(spec.parameters, "start", "rest"), frame.settle, frame.duration)
-                ),
-                "optimum_settled_deg_s": degrees(optimum_settled),
-                "no_bound": bounds.reason,
+                **self._errors[name].result(),
+                **self._errors[name].consistency(),
+                **floors,
+                "optimum_rmse_deg_s": self._of_run(bounds, name)[0],
+                "optimum_settled_deg_s": settled,
                 "consistency": self._consistency[name].result(),
             }
             for name, spec in self._scenario.fusion.items()
         }
-        for row in fusion.values():
+        for name, row in fusion.items():
+            of_lines = self._of_run(bounds, name)[1]
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
         from testbed.judging.budget import budget_summary
@@ -115,30 +117,44 @@ class Judge:
             "turntable": self._table.result(),
             "sensors": sensors,
             "fusion": fusion,
-            "floor_density": None if floor is None else _floor_curve(psds, frame.bandwidth),
-            "budget": None if floor is None else budget_summary(psds, frame.bandwidth),
+            "bounds_reason": bounds.reason or why,
+            "floor_density": _floor_curve(psds, frame.bandwidth) if psds else None,
+            "budget": budget_summary(psds, frame.bandwidth) if psds else None,
             "expectations": self._expectations({**sensors, **fusion}),
             "versions": dict(versions or {}),
+            "setup": departures(self._scenario),
             "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
         }
         return RunMetrics.model_validate(found)
 
-    def _bounds(self) -> tuple[Bounds, list[tuple[float, float]]]:
-        """Return what no filter gets below, one for all filters, and the lines that move."""
-        lines = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
-        # A table that does not move has no lines in its truth, only arithmetic noise.
-        moving = [(freq, amplitude) for freq, amplitude in lines if amplitude > np.deg2rad(1e-9)]
-        from testbed.judging.bounds import bounds_of
+    def _lines(self) -> list[tuple[float, float]]:
+        """Return frequency [Hz] and amplitude [rad/s] of the lines in the truth; none of a table that does not move,
+        whose truth has only arithmetic noise.
+        """
+        found = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
+        return [(freq, amplitude) for freq, amplitude in found if amplitude > np.deg2rad(1e-9)]
 
-        frame, sensors = self._scenario.frame, self._scenario.sensors
-        found = bounds_of(
-            sensors,
-            {name: self._rates[name] for name in sensors},
-            [lines, *([line] for line in moving)] if moving else [],
-            bandwidth=frame.bandwidth,
-            no_rate_below=frame.no_rate_below,
-        )
-        return found, moving
+    def _settled(self, bounds: Bounds) -> tuple[float | None, str | None]:
+        """Return what the best filter of this very signal leaves once settled [deg/s], or None and why."""
+        lines = self._lines()
+        if not lines:
+            return None, "the signal has no lines" if self._scenario.fusion else None
+        best, why = bounds.settled([lines])
+        return (None, why) if best is None else (in_deg(best[0].rmse), None)
+
+    def _of_run(self, bounds: Bounds, name: str) -> tuple[float | None, dict[float, float | None]]:
+        """Return what the best filter of this very signal leaves in this run, from the start that a filter knows of,
+        and of each line alone by frequency [Hz] [deg/s].
+        """
+        frame, lines = self._scenario.frame, self._lines()
+        if not lines:
+            return None, {}
+        start: StartKind = getattr(self._scenario.fusion[name].parameters, "start", "rest")
+        best, _ = bounds.of_run([lines, *([line] for line in lines)], start, (frame.settle, frame.duration))
+        if best is None:
+            return None, {}
+        whole, *alone = (in_deg(one.rmse) for one in best)
+        return whole, {freq: value for (freq, _), value in zip(lines, alone, strict=True)}
 
     def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
         rows = []
@@ -156,15 +172,15 @@ class Judge:
         return rows
 
 
+def in_deg(rate: float | None) -> float | None:
+    """Return a rate [rad/s] in deg/s, None for None."""
+    return None if rate is None else float(np.rad2deg(rate))
+
+
 def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:
     """Return how many readings of each sensor the front part of a filter has struck out so far."""
     stem = "gated_"
     return {key[len(stem) :]: int(n[-1]) for key, n in diagnostics.items() if key.startswith(stem) and n.size}
-
-
-def degrees(value: float | None) -> float | None:
-    """Return deg/s of a value in rad/s, None of None."""
-    return None if value is None else float(np.rad2deg(value))
 
 
 def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:

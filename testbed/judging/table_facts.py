@@ -11,7 +11,7 @@ from testbed.metrics.errors import ErrorMetrics
 from testbed.models.turntable.modes import coupled_modes
 from testbed.models.turntable.parameters import TurntableParameters
 from testbed.models.turntable.turntable import Turntable
-from testbed.scenario.checks import command_peaks
+from testbed.scenario.peaks import command_peaks
 from testbed.scenario.step_choice import StepChoice, choose_step, excerpt
 from testbed.signals import BASE_RATE_HZ
 
@@ -99,7 +99,7 @@ def table_facts(scenario: Scenario, step: StepChoice | None = None) -> TableFact
     parameters = scenario.turntable
     moves = parameters.mode not in {"ideal", "fixed"}
     modes = coupled_modes(parameters) if moves else (np.empty(0), np.empty(0))
-    torque = 0.0 if parameters.mode == "fixed" else command_peaks(scenario)[1]
+    torque = 0.0 if parameters.mode == "fixed" else command_peaks(scenario).torque
     noise = truth_noise(parameters, excerpt(scenario).process(min(_NOISE_STEPS, scenario.n_time)))
     return TableFacts(*modes, torque, parameters.torque_limit if moves else None, noise, step or choose_step(scenario))
 

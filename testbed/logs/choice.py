@@ -10,8 +10,8 @@ from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap, load_map
 from testbed.logs.options import quantity, refusal
-from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan
-from testbed.logs.reader import read_map, read_plans
+from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan, time_columns
+from testbed.logs.reader import is_map, read_map, read_plans
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     Parameters
     ----------
     path : Path
-        The recording.
+        The recording, or a map that names it.
     wanted : Selection
         The options.
     text : TextOptions, optional
@@ -43,11 +43,16 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     ScenarioError
         If something is missing, contradicts, is not understood or not in the file; with the option.
     """
-    if wanted.map is not None:
+    if wanted.map is not None or is_map(path):
         return _mapped(path, wanted)
     table = open_table(path, text)
     rate_hz = quantity(wanted.rate, "Hz", "100 Hz", "--rate") if wanted.rate else None
-    time = time_map(wanted.time, wanted.time_unit, None if wanted.time else rate_hz)
+    clock = wanted.time
+    if clock is None and wanted.time_unit and rate_hz is None:
+        # The unit alone was said: of the column that is the time by its name.
+        found = time_columns(table, table.columns[0].group)
+        clock = str(found[0] + 1) if len(found) == 1 else None
+    time = time_map(clock, wanted.time_unit, None if wanted.time else rate_hz)
     columns = wanted.column or _rotations(table, wanted)
     maps = [channel_map(column=c, unit=wanted.unit, scale=wanted.scale, kind=wanted.kind, time=time) for c in columns]
     plans = [plan(one.column if wanted.column else _name(table, one), one, table) for one in maps]
@@ -83,13 +88,13 @@ def _as_options(error: ValidationError, prefix: str = "") -> ScenarioError:
 
 
 def _mapped(path: Path, wanted: Selection) -> list[LogChannel]:
-    assert wanted.map is not None
+    place = wanted.map or path
     if wanted.given:
-        raise refusal(wanted.map, f"says this: leave out {', '.join(wanted.given)}", "--map")
-    channels = read_map(path, load_map(wanted.map)).channels
+        raise refusal(place, f"says this: leave out {', '.join(wanted.given)}", "--map")
+    channels = read_map(None if wanted.map is None else path, load_map(place)).channels
     unknown = [name for name in wanted.column or [] if name not in channels]
     if unknown:
-        raise refusal(wanted.map, str(UnknownNameError("channel", unknown[0], channels)), "--column")
+        raise refusal(place, str(UnknownNameError("channel", unknown[0], channels)), "--column")
     if wanted.column:
         return [channels[name] for name in wanted.column]
     return [channel for channel in channels.values() if channel.quantity in ROTATIONS]
@@ -102,6 +107,8 @@ def _rotations(table: Table, wanted: Selection) -> list[str]:
         from testbed.logs.plan import find_column
 
         rest = [i for i in rest if i != find_column(table, wanted.time, "--time")]
+    # A column without a name beside others is the number of the row.
+    rest = [i for i in rest if table.columns[i].name] or rest
     named = [i for i in rest if measured_quantity(table, i) in ROTATIONS]
     # With increments and rates side by side, the rates are meant unless the kind is said.
     rates = [i for i in named if (measured_quantity(table, i) == "rate") == (wanted.kind in {None, "rate"})]

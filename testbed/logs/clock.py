@@ -28,6 +28,8 @@ _ON_GRID = 20
 # 95 % of a normal distribution.
 _QUANTILE = 1.96
 _KEPT = 1000
+# Stamps looked at in one go: as many as stay in the processor's cache.
+_CHUNK = 1 << 15
 # Share of doubled stamps from which on the stamps are coarser than the samples.
 _COARSE = 0.05
 
@@ -167,6 +169,11 @@ class ClockScan:
         if not stamps.size:
             return stamps
         stamps = self._unwrapped(stamps)
+        for start in range(0, stamps.size, _CHUNK):
+            self._add(stamps[start : start + _CHUNK])
+        return stamps
+
+    def _add(self, stamps: Stamps) -> None:
         if not self._n_time:
             self._start = self._last = int(stamps[0])
         steps = np.diff(stamps, prepend=np.int64(self._last))
@@ -179,7 +186,6 @@ class ClockScan:
             self._tell(rows, steps, stamps[-steps.size :])
         self._n_time += stamps.size
         self._last = int(stamps[-1])
-        return stamps
 
     def result(self) -> TimeBase:
         """Return what was found."""
@@ -228,6 +234,10 @@ class ClockScan:
 
     def _tell(self, rows: NDArray[np.intp], steps: Stamps, stamps: Stamps) -> None:
         """Sort the steps: back, none, one or several samples, or none of these."""
+        first = int(steps[0])
+        if first > 0 and int(steps.min()) == int(steps.max()) and abs(first - self._usual) < TOLERANCE * self._usual:
+            self._weigh_alike(first, steps.size)
+            return
         if self._quantum != 1 and steps.any():
             self._quantum = int(np.gcd(self._quantum, np.gcd.reduce(np.abs(steps))))
         usual = self._usual if self._usual > 0.0 else 1.0
@@ -249,6 +259,18 @@ class ClockScan:
                     rows[found], seconds[found], steps[found].astype(np.float64) * NANO, np.maximum(count[found] - 1, 0)
                 )
         self._weigh(steps, count, over, (steps > 0) & ~far & (count >= 1) & (count <= _ON_GRID))
+
+    def _weigh_alike(self, step: int, n_steps: int) -> None:
+        """Weigh steps that are all the same, as those of a good logger are."""
+        self._quantum = int(np.gcd(self._quantum, step))
+        self._n_steps += n_steps
+        self._n_samples += n_steps
+        self._length += n_steps * step
+        over = step - self._usual
+        self._sum += n_steps * over
+        self._square += n_steps * over**2
+        self._lagged += (n_steps - 1) * over**2 + self._previous * over
+        self._previous = over
 
     def _weigh(self, steps: Stamps, count: Stamps, over: FloatArray, good: NDArray[np.bool_]) -> None:
         self._n_steps += int(good.sum())
@@ -309,15 +331,15 @@ def nanoseconds(values: NDArray[Any], unit_s: float) -> Stamps:
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").view(np.int64)
     whole = Fraction(unit_s / NANO).limit_denominator(1000)
-    limit = float(np.iinfo(np.int64).max)
-    largest = float(np.max(np.abs(values.astype(np.float64)), initial=0.0)) if values.size else 0.0
-    if not largest * unit_s / NANO < limit:
+    largest = max(abs(float(values.min())), abs(float(values.max()))) if values.size else 0.0
+    if not largest * unit_s / NANO < float(np.iinfo(np.int64).max):
         msg = f"a stamp of {largest:g} with a unit of {unit_s:g} s is out of range"
         raise OverflowError(msg)
     if values.dtype.kind in "iu" and whole.denominator == 1:
-        return values.astype(np.int64) * np.int64(whole.numerator)
-    scaled = values.astype(np.float64) * (unit_s / NANO) if unit_s != 1.0 else values.astype(np.float64) * 1e9
-    return np.rint(scaled).astype(np.int64)
+        return values.astype(np.int64, copy=False) * np.int64(whole.numerator)
+    ticks = whole.numerator if whole.denominator == 1 else unit_s / NANO
+    scaled = values.astype(np.promote_types(values.dtype, np.float64)) * ticks
+    return np.rint(scaled, out=scaled).astype(np.int64)
 
 
 def resolution_ns(values: NDArray[Any], unit_s: float) -> float:

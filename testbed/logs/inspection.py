@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.clock import NANO, ClockScan, Tally, TimeBase, resolution_ns
-from testbed.logs.reader import stamps_of, wrap_of
+from testbed.logs.clock import NANO, Tally, TimeBase
+from testbed.logs.reader import stamp_scans
 from testbed.logs.values import Values, ValueScan, word_size
 
 if TYPE_CHECKING:
@@ -89,21 +89,16 @@ def inspect(plans: Sequence[Plan]) -> list[Report]:
 def _inspect_group(plans: Sequence[Plan]) -> Iterator[tuple[Plan, Report]]:
     table = plans[0].table
     scans = [ValueScan() for _ in plans]
-    clocks: dict[tuple[int, float], ClockScan] = {}
+    clocks = stamp_scans(plans)
     stamps = {one.stamps for one in plans if one.stamps is not None}
-    row = 0
     for block in table.blocks(list(dict.fromkeys([*(one.value for one in plans), *stamps])), stamps):
         for one, scan in zip(plans, scans, strict=True):
             scan.add(np.asarray(block[one.value], np.float64))
-        for column, unit in {(one.stamps, one.time_unit) for one in plans if one.stamps is not None}:
-            raw = block[column]
-            if (column, unit) not in clocks:
-                clocks[column, unit] = ClockScan(resolution_ns(raw, unit), wrap_of(raw, unit))
-            clocks[column, unit].add(stamps_of(table, raw, column, unit, row))
-        row += next(iter(block.values())).size
+        for stamp in clocks.values():
+            stamp.add(block[stamp.column])
     for one, scan in zip(plans, scans, strict=True):
-        clock = clocks[one.stamps, one.time_unit].result() if one.stamps is not None and clocks else None
-        values = scan.result()
+        found = clocks.get((one.stamps, one.time_unit))
+        clock, values = None if found is None else found.result(), scan.result()
         yield one, Report(one, values, clock, tuple(channel_findings(table, clock, values, one)))
 
 
@@ -123,8 +118,9 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
     """
     if clock is not None:
         yield from _of_time(table, clock)
-        if one.rate_hz is not None and not clock.agrees_with(one.rate_hz):
-            yield Finding("rate", f"the nominal rate {one.rate_hz:g} Hz contradicts the stamps: {clock.said()}")
+        nominal = one.rate_hz or one.nominal_hz
+        if nominal is not None and clock.even and not clock.agrees_with(nominal):
+            yield Finding("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
     if values.n_missing:
         yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
     if values.repeats > 1.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from testbed import units
@@ -12,7 +13,6 @@ from testbed.document import Document
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
 from testbed.parts import Part
-from testbed.units import Frequency
 
 Kind = Literal["rate", "increment", "angle"]
 _COUNTS = {"lsb", "count", "counts", "digit", "digits"}
@@ -29,6 +29,12 @@ def _plain_frequency(value: Any) -> Any:
     return quantity(value, "Hz", "100 Hz", "rate") if isinstance(value, str) else value
 
 
+def _by_number(value: Any) -> Any:
+    """Take a column's number as its text."""
+    return str(value) if type(value) is int else value
+
+
+ColumnText = Annotated[str, BeforeValidator(_by_number)]
 Location = Annotated[Path, AfterValidator(_beside_map)]
 
 
@@ -42,17 +48,17 @@ class TimeMap(Part):
     unit : str, optional
         Their unit, such as ``us`` or ``0.1 ms``; dates need none.
     epoch : str, optional
-        What zero is, ISO 8601, where the numbers do not count from 1970; only for the reader's date.
+        What zero is, in ISO 8601, where the stamps do not count from 1970.
     rate : float, optional
         Sample rate [Hz] of even samples, instead of stamps.
     offset : float
         Added to the time [s].
     """
 
-    column: str | None = None
+    column: ColumnText | None = None
     unit: str | None = None
     epoch: str | None = None
-    rate: Annotated[Frequency | None, BeforeValidator(_plain_frequency)] = None
+    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False), BeforeValidator(_plain_frequency)] | None = None
     offset: Annotated[float, units.Quantity("s", "1 ms")] = 0.0
 
     @model_validator(mode="after")
@@ -62,7 +68,19 @@ class TimeMap(Part):
             raise ValueError(msg)
         if self.unit is not None:
             time_factor(self.unit)
+        _ = self.epoch_ns
         return self
+
+    @property
+    def epoch_ns(self) -> int:
+        """Zero of the stamps in nanoseconds from 1970 on."""
+        if self.epoch is None:
+            return 0
+        try:
+            return int(np.datetime64(self.epoch.removesuffix("Z"), "ns").astype(np.int64))
+        except ValueError as error:
+            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {self.epoch!r}"
+            raise ValueError(msg) from error
 
 
 class ChannelMap(Part):
@@ -92,7 +110,7 @@ class ChannelMap(Part):
         Largest value of the sensor with its unit, such as ``2000 deg/s``.
     """
 
-    column: str
+    column: ColumnText
     file: Location | None = None
     topic: str | None = None
     unit: str | None = None

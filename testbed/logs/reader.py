@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,21 +11,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
+from testbed.logs.chain import FileChain
 from testbed.logs.channel import Log, LogChannel
-from testbed.logs.clock import NANO, ClockScan, TimeBase, nanoseconds, resolution_ns
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
 from testbed.logs.names import take_apart
 from testbed.logs.options import refusal
 from testbed.logs.plan import Plan, channels_of, plan
 from testbed.logs.selection import TextOptions
+from testbed.logs.stamps import StampScan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from testbed.logs.clock import TimeBase
     from testbed.logs.table import Table
+
+    Timed = tuple[int | None, float]
 
 
 def read_log(
@@ -36,7 +41,7 @@ def read_log(
     Parameters
     ----------
     path : str or Path
-        The file.
+        The file, or a map that names it.
     map : LogMap, mapping, str or Path, optional
         Which column is what, or the YAML file that says so; left out: what the names of the columns say.
 
@@ -59,7 +64,14 @@ def read_log(
     >>> round(channel.rate_hz, 6), round(float(channel.values[1]), 6)
     (2000.0, 0.017453)
     """
+    if map is None and is_map(path):
+        return read_map(None, load_map(Path(path)))
     return read_map(Path(path), as_map(map))
+
+
+def is_map(path: str | Path) -> bool:
+    """Return whether a file is a map, by its name."""
+    return Path(path).suffix.lower() in {".yaml", ".yml"}
 
 
 def as_map(given: LogMap | Mapping[str, Any] | str | Path | None) -> LogMap | None:
@@ -91,23 +103,17 @@ def read_map(path: Path | None, found: LogMap | None) -> Log:
 def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
     """Return how the channels of a map are read."""
     options = TextOptions(found.separator, found.decimal, found.encoding, found.skip)
-    files = (
-        [path]
-        if path is not None
-        else found.file
-        if isinstance(found.file, list)
-        else [found.file]
-        if found.file
-        else []
-    )
-    tables: dict[Path, Table] = {}
+    said = found.file if isinstance(found.file, list) else [found.file] if found.file else []
+    files = tuple(said if path is None else [path])
+    tables: dict[tuple[Path, ...], Table] = {}
     plans = []
     for name, channel in found.channels.items():
-        own = channel.file or (files[0] if files else None)
-        if own is None:
+        own = (channel.file,) if channel.file else files
+        if not own:
             raise ScenarioError([Problem("expected the file of the recording", key=f"channels.{name}.file")])
         if own not in tables:
-            tables[own] = open_table(own, options)
+            opened = [open_table(one, options) for one in own]
+            tables[own] = opened[0] if len(opened) == 1 else FileChain(opened)
         plans.append(plan(name, channel, tables[own], lambda field, name=name: f"channels.{name}.{field}"))  # type: ignore[misc]
     return plans
 
@@ -139,81 +145,53 @@ def read_plans(plans: Sequence[Plan]) -> dict[str, LogChannel]:
 
 def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
     table = plans[0].table
-    scans = {(one.stamps, one.time_unit): None for one in plans if one.stamps is not None}
-    clocks: dict[tuple[int | None, float], tuple[NDArray[np.int64], TimeBase]] = {}
-    columns = _columns(table, plans)
-    for stamps, unit in scans:
-        assert stamps is not None
-        clocks[stamps, unit] = scan_clock(table, columns[stamps], stamps, unit)
+    scans = stamp_scans(plans)
+    columns, times = _columns(table, plans, scans)
+    uses = Counter(one.value for one in plans)
     for one in plans:
-        yield one.name, _channel(one, columns[one.value], clocks.get((one.stamps, one.time_unit)))
+        # A channel scales its numbers in place.
+        values = columns[one.value].copy() if uses[one.value] > 1 else columns[one.value]
+        key = (one.stamps, one.time_unit)
+        yield one.name, _channel(one, values, (times[key], scans[key].result()) if key in times else None)
 
 
-def _columns(table: Table, plans: Sequence[Plan]) -> dict[int, NDArray[Any]]:
-    """Return whole columns: lists of blocks are joined one by one, so that no two copies of all stand in memory."""
+def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
+    """Return what looks at the stamps of channels of one group, by column and unit."""
+    keys = {(one.stamps, one.time_unit) for one in plans}
+    return {(i, unit): StampScan(plans[0].table, i, unit) for i, unit in keys if i is not None}
+
+
+def _columns(
+    table: Table, plans: Sequence[Plan], scans: Mapping[Timed, StampScan]
+) -> tuple[dict[int, NDArray[Any]], dict[Timed, NDArray[np.int64]]]:
+    """Return whole columns and stamps: blocks are joined one by one, so that no two copies of all stand in memory."""
     stamps = {one.stamps for one in plans if one.stamps is not None}
-    wanted = list(dict.fromkeys([*(one.value for one in plans), *stamps]))
-    parts: dict[int, list[NDArray[Any]]] = {i: [] for i in wanted}
-    for block in table.blocks(wanted, stamps):
-        for i, values in block.items():
-            parts[i].append(values)
-    sizes = {sum(part.size for part in parts[i]) for i in wanted}
-    if min(sizes) < 1:
+    values: dict[int, list[NDArray[Any]]] = {one.value: [] for one in plans}
+    times: dict[Timed, list[NDArray[np.int64]]] = {key: [] for key in scans}
+    n_time = 0
+    for block in table.blocks(list(dict.fromkeys([*values, *stamps])), stamps):
+        n_time += next(iter(block.values())).size
+        for i, parts in values.items():
+            parts.append(block[i])
+        for key, scan in scans.items():
+            times[key].append(scan.add(block[scan.column]))
+    if not n_time:
         raise refusal(table.path, "expected at least 4 samples, got 0")
-    if len(sizes) > 1:
-        names = ", ".join(f"{table.columns[i].name!r} {sum(p.size for p in parts[i])}" for i in wanted)
-        raise refusal(table.path, f"expected columns of one length, got {names}")
-    columns = {}
-    for i in wanted:
-        found = parts.pop(i)
-        columns[i] = found[0] if len(found) == 1 else np.concatenate(found)
-    return columns
+    return {i: _joined(parts) for i, parts in values.items()}, {key: _joined(parts) for key, parts in times.items()}
 
 
-def scan_clock(table: Table, values: NDArray[Any], column: int, unit_s: float) -> tuple[NDArray[np.int64], TimeBase]:
-    """Return the stamps of a whole column [ns], a counter's turns added, and what they say.
-
-    Raises
-    ------
-    ScenarioError
-        If a stamp is missing or out of range.
-    """
-    scan = ClockScan(resolution_ns(values, unit_s), wrap_of(values, unit_s))
-    stamps = scan.add(stamps_of(table, values, column, unit_s))
-    return stamps, scan.result()
-
-
-def stamps_of(table: Table, values: NDArray[Any], column: int, unit_s: float, first_row: int = 0) -> NDArray[np.int64]:
-    """Return stamps in nanoseconds; ScenarioError with the line of one that is missing or out of range."""
-    missing = (
-        np.isnat(values) if values.dtype.kind == "M" else ~np.isfinite(values) if values.dtype.kind == "f" else None
-    )
-    name = table.columns[column].name
-    if missing is not None and missing.any():
-        row = first_row + int(np.argmax(missing))
-        message = f"expected a time in {name!r}, got none; remove the line"
-        raise refusal(table.path, message, line=table.line(row))
-    try:
-        return nanoseconds(values, unit_s)
-    except OverflowError as error:
-        raise refusal(table.path, f"{error}; is the unit of {name!r} right?", "--time-unit") from error
-
-
-def wrap_of(values: NDArray[Any], unit_s: float) -> int:
-    """Return the turn of a counter of 32 bits, or of a time of day [ns]."""
-    if values.dtype.kind == "M":
-        return round(86400 / NANO) if values.size and abs(int(values.view(np.int64)[0])) < 86400 / NANO else 0
-    small = values.dtype.kind in "iu" and values.size and 0 <= int(values.max()) < 1 << 32 and int(values.min()) >= 0
-    turn = (1 << 32) * unit_s / NANO
-    return round(turn) if small and turn < float(1 << 62) else 0
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """Return blocks as one array, and let go of them."""
+    whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
+    parts.clear()
+    return whole
 
 
 def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], TimeBase] | None) -> LogChannel:
     table = one.table
     numbers = values.astype(np.float64) if values.dtype.kind != "f" or values.dtype.itemsize != 8 else values
-    infinite = np.isinf(numbers)
-    if infinite.any():
-        row = int(np.argmax(infinite))
+    if np.isinf(numbers).any():
+        row = int(np.argmax(np.isinf(numbers)))
         message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
         raise refusal(table.path, message, line=table.line(row))
     stamps, clock = timed if timed else (None, None)
@@ -222,8 +200,12 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         assert one.rate_hz is not None
         notes += _contradiction(one, clock)
         stamps, clock = None, None
+    elif clock is not None and one.nominal_hz is not None and clock.even and not clock.agrees_with(one.nominal_hz):
+        notes.append(
+            f"contradiction: the file says {one.nominal_hz:g} Hz, its stamps {clock.said()}; the stamps are used"
+        )
     rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
-    si = numbers if one.factor == 1.0 and one.zero == 0.0 else one.zero + one.factor * numbers
+    si = _in_si(numbers, one)
     return LogChannel(
         name=one.name,
         label=one.label,
@@ -238,6 +220,17 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         table=table,
         largest=one.largest,
     )
+
+
+def _in_si(numbers: NDArray[np.float64], one: Plan) -> NDArray[np.float64]:
+    """Return the numbers in SI, in place where they are ours."""
+    if one.factor == 1.0 and one.zero == 0.0:
+        return numbers
+    si = numbers if numbers.flags.writeable and numbers.flags.owndata else numbers.copy()
+    si *= one.factor
+    if one.zero:
+        si += one.zero
+    return si
 
 
 def _contradiction(one: Plan, clock: TimeBase) -> list[str]:

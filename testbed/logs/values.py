@@ -13,11 +13,12 @@ if TYPE_CHECKING:
 # Rows of the outline beyond which pairs are joined, and samples that the word is looked for in.
 _ROWS, _SAMPLE = 8192, 200_000
 # A word is one if all differences are whole multiples of it to this part, up to so many words.
-_WHOLE, _MOST_WORDS = 0.05, 1e6
+_WHOLE, _MOST_WORDS = 0.05, 1e9
 # Share of equal neighbours, and word in steps, from which on values count as repeated.
 _REPEATED, _FINE = 0.2, 0.2
-# Share of samples at an end, and how many in a row, that count as saturation.
-_AT_END, _IN_A_ROW = 1e-3, 3
+# Share of samples at an end that counts as saturation, if three stand in a row or the words are a tenth of the noise:
+# chance puts several samples on the same coarse word.
+_AT_END, _IN_A_ROW, _FINE_WORD = 1e-3, 3, 0.1
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,11 @@ class Values:
     @property
     def saturated(self) -> bool:
         """Whether the numbers stand still at an end, as those of a sensor out of its range do."""
+        fine = self.word < _FINE_WORD * self.step_std
         still = (self.at_low, self.row_low), (self.at_high, self.row_high)
-        moving = self.std > 0.0 and self.word < self.std
-        return (
-            moving and any(n > _AT_END * self.n_time and row >= _IN_A_ROW for n, row in still) and self.repeats == 1.0
+        many = max(_AT_END * self.n_time, _IN_A_ROW)
+        return self.repeats == 1.0 and any(
+            n > many and (fine or row >= _IN_A_ROW) for n, row in still if self.std > 0.0
         )
 
     @property

@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.metrics.line_fit import Line, LineFit
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from testbed.signals import FloatArray
+
+# Where the integral of the floor begins [Hz].
+_LOWEST_HZ = 1e-6
 
 
 class ErrorMetrics:
@@ -29,18 +34,16 @@ class ErrorMetrics:
         Commanded line frequencies [Hz].
     gaps : bool, optional
         NaN estimates are lost readings: left out and counted as `missing`. Otherwise they leave the result undefined.
+    span : tuple of two floats, optional
+        From when to when samples come [s]; without it gain and phase have no interval.
     """
 
-    def __init__(self, lines: Sequence[float], *, gaps: bool = False) -> None:
-        self._lines = tuple(lines)
+    def __init__(self, lines: Sequence[float], *, gaps: bool = False, span: tuple[float, float] | None = None) -> None:
+        self._fit = LineFit(lines, span)
         self._gaps, self._missing = gaps, 0
-        n = 2 * len(self._lines)
         self._n = 0
         self._square = 0.0
         self._peak = 0.0
-        self._gram = np.zeros((n, n))
-        self._with_error = np.zeros(n)
-        self._with_truth = np.zeros(n)
         self._variance = 0.0
         self._inside = 0
 
@@ -66,35 +69,26 @@ class ErrorMetrics:
         self._n += t.size
         self._square += float(error @ error)
         self._peak = max(self._peak, float(np.max(np.abs(error))))
-        if self._lines:
-            basis = np.concatenate([f(2.0 * np.pi * line * t)[None] for line in self._lines for f in (np.cos, np.sin)])
-            self._gram += basis @ basis.T
-            self._with_error += basis @ error
-            self._with_truth += basis @ truth
+        self._fit.add(t, error, truth)
         if std is not None:
             self._variance += float(std @ std)
             self._inside += int(np.count_nonzero(np.abs(error) <= 2.0 * std))
 
     def result(self) -> dict[str, Any]:
-        """Return the metrics in deg/s and degrees, None where undefined; `missing` is the number of lost readings."""
+        """Return the metrics in deg/s and degrees, None where undefined; `missing` is the number of lost readings.
+
+        `gain_ci95` and `phase_ci95_deg` are half the width of the 95 % interval.
+        """
         missing = {"missing": self._missing} if self._gaps else {}
         if not self._n:
             return {"rmse_deg_s": None, "rmse_aligned_deg_s": None, "peak_error_deg_s": None, "lines": [], **missing}
-        gains = self._gains()
-        rest = self._rest() if self._lines else 0.0
+        lines = self._fit.result()
+        rest = self._rest() if lines else 0.0
         return {
             "rmse_deg_s": finite(np.rad2deg(np.sqrt(self._square / self._n))),
-            "rmse_aligned_deg_s": self._aligned(gains, rest),
+            "rmse_aligned_deg_s": self._aligned(lines, rest),
             "peak_error_deg_s": finite(np.rad2deg(self._peak)),
-            "lines": [
-                {
-                    "frequency_hz": line,
-                    "gain": None if g is None else finite(abs(g)),
-                    "phase_deg": None if g is None else finite(np.angle(g, deg=True)),
-                    "error_deg_s": None if g is None else finite(np.rad2deg(_hypot(rest, a * abs(g - 1.0)))),
-                }
-                for line, (a, g) in zip(self._lines, gains, strict=True)
-            ],
+            "lines": [_row(freq, line, rest) for freq, line in zip(self._fit.lines, lines, strict=True)],
             **missing,
         }
 
@@ -113,39 +107,35 @@ class ErrorMetrics:
         """
         if not self._n:
             return []
-        return [(line, amplitude) for line, (amplitude, _) in zip(self._lines, self._gains(), strict=True)]
-
-    def _gains(self) -> list[tuple[float, complex | None]]:
-        """Return amplitude of the truth and complex gain estimate/truth of each line."""
-        if not self._lines:
-            return []
-        truth = _phasors(self._gram, self._with_truth)
-        error = _phasors(self._gram, self._with_error)
-        # A line that is not in the truth (a fixed table) has no gain: below 1e-9 deg/s it is arithmetic noise.
-        return [(abs(c), 1.0 + e / c if abs(c) > np.deg2rad(1e-9) else None) for c, e in zip(truth, error, strict=True)]
+        return [(freq, line.amplitude) for freq, line in zip(self._fit.lines, self._fit.result(), strict=True)]
 
     def _rest(self) -> float:
         """Return the mean square of the error once the lines are fitted out [rad^2/s^2]."""
-        fit, *_ = np.linalg.lstsq(self._gram, self._with_error, rcond=None)
-        rest = (self._square - 2.0 * fit @ self._with_error + fit @ self._gram @ fit) / self._n
-        return max(float(rest), 0.0)
+        return max((self._square - self._fit.explained()) / self._n, 0.0)
 
-    def _aligned(self, gains: list[tuple[float, complex | None]], rest: float) -> float | None:
-        if not gains or any(g is None for _, g in gains):
+    def _aligned(self, lines: list[Line], rest: float) -> float | None:
+        if not lines or any(line.gain is None for line in lines):
             return None
-        lines = sum(a**2 * (abs(g) - 1.0) ** 2 / 2.0 for a, g in gains if g is not None)
-        return finite(np.rad2deg(np.sqrt(rest + lines)))
+        of_lines = sum(line.amplitude**2 * (abs(line.gain) - 1.0) ** 2 / 2.0 for line in lines if line.gain is not None)
+        return finite(np.rad2deg(np.sqrt(rest + of_lines)))
+
+
+def _row(frequency: float, line: Line, rest: float) -> dict[str, float | None]:
+    """Return the metrics of a line, `rest` being the mean square of the error on no line [rad^2/s^2]."""
+    g, half, phase_half = line.gain, line.half_width, line.phase_half_width()
+    return {
+        "frequency_hz": frequency,
+        "gain": None if g is None else finite(abs(g)),
+        "gain_ci95": None if half is None else finite(half),
+        "phase_deg": None if g is None else finite(np.angle(g, deg=True)),
+        "phase_ci95_deg": None if phase_half is None else finite(phase_half),
+        "error_deg_s": None if g is None else finite(np.rad2deg(_hypot(rest, line.amplitude * abs(g - 1.0)))),
+    }
 
 
 def _hypot(rest: float, amplitude: float) -> float:
     """Return the rms of a sine and something else of the mean square `rest`."""
     return float(np.sqrt(rest + 0.5 * amplitude**2))
-
-
-def _phasors(gram: FloatArray, projection: FloatArray) -> list[complex]:
-    """Return c = p - j q of each fitted p cos + q sin, so that the line is Re(c exp(j w t))."""
-    fit, *_ = np.linalg.lstsq(gram, projection, rcond=None)
-    return [complex(p, -q) for p, q in fit.reshape(-1, 2)]
 
 
 def finite(value: Any) -> float | None:
@@ -178,13 +168,13 @@ def floor_density(psds: Sequence[Callable[[FloatArray], FloatArray]], freq_hz: F
 
 
 def floor_rmse(
-    psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float, lowest_hz: float | None = None
+    psds: Sequence[Callable[[FloatArray], FloatArray]], bandwidth_hz: float, from_hz: float = 0.0
 ) -> float | None:
-    r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_0^W df / \sum_i 1/S_i}`
+    r"""Return the noise that no filter of an unknown signal gets below, :math:`\sqrt{2\int_{f_0}^W df / \sum_i 1/S_i}`
     [rad/s].
 
-    Non-causal; None if no sensor sees some part of the band. The integral runs over ln f from 1e-6 Hz, 200 points per
-    decade (trapezoid); below that the density is taken as constant.
+    Non-causal (Wiener); None if no sensor sees some part of the band. The integral runs over ln f from 1e-6 Hz, 200
+    points per decade (trapezoid); below that the density is taken as constant.
 
     Parameters
     ----------
@@ -192,16 +182,15 @@ def floor_rmse(
         Input-referred two-sided noise density of each sensor, Hz -> rad^2/s.
     bandwidth_hz : float
         W [Hz].
-    lowest_hz : float, optional
-        Where the rate is known to have nothing below [Hz]: the integral begins here (Wiener's formula for a rate that
-        is unknown in the rest of the band).
+    from_hz : float, optional
+        f_0, below which the signal is known to have nothing [Hz].
     """
-    if not psds:
+    if not psds or from_hz >= bandwidth_hz:
         return None
-    first = 1e-6 if lowest_hz is None else lowest_hz
-    freq = np.geomspace(first, bandwidth_hz, max(int(200 * np.log10(bandwidth_hz / first)), 2))
+    lowest = max(from_hz, _LOWEST_HZ)
+    freq = np.geomspace(lowest, bandwidth_hz, max(int(200 * np.log10(bandwidth_hz / lowest)), 2))
     density = floor_density(psds, freq)
     if not np.all(np.isfinite(density)):
         return None
-    below = density[0] * freq[0] if lowest_hz is None else 0.0
+    below = density[0] * max(freq[0] - from_hz, 0.0)
     return float(np.sqrt(2.0 * (np.trapezoid(density * freq, np.log(freq)) + below)))

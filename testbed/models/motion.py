@@ -61,6 +61,10 @@ class Motion(Part):
         """Return the highest frequency [Hz] that the term contains."""
         raise NotImplementedError
 
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the rate."""
+        return max(len(self.lines()), 1)
+
 
 @dataclass(frozen=True)
 class CommandBlock:
@@ -186,19 +190,22 @@ class MotionProfile:
 
     def process(self, n_time: int) -> CommandBlock:
         """Return the next `n_time` steps."""
-        block = self.peek(n_time)
+        block = self._block(self._start, n_time, self._angle)
         self._start += n_time
         self._angle = float(block.angle[-1])
         return block
 
-    def peek(self, n_time: int) -> CommandBlock:
-        """Return the next `n_time` steps and stay before them."""
+    def peek(self, n_time: int, start: int | None = None) -> CommandBlock:
+        """Return the next `n_time` steps, or those from `start` on with angles from zero, and stay before them."""
+        return self._block(self._start, n_time, self._angle) if start is None else self._block(start, n_time, 0.0)
+
+    def _block(self, start: int, n_time: int, angle_before: float) -> CommandBlock:
         h = 1.0 / self._sample_rate_hz
-        half_steps = self.rate(sample_times(2 * self._start, 2 * n_time + 1, 2.0 * self._sample_rate_hz))
+        half_steps = self.rate(sample_times(2 * start, 2 * n_time + 1, 2.0 * self._sample_rate_hz))
         w0, wm, w1 = half_steps[:-1:2], half_steps[1::2], half_steps[2::2]
-        angle = np.cumsum(np.concatenate([[self._angle], (w0 + 4.0 * wm + w1) * (h / 6.0)]))
+        angle = np.cumsum(np.concatenate([[angle_before], (w0 + 4.0 * wm + w1) * (h / 6.0)]))
         return CommandBlock(
-            start=self._start,
+            start=start,
             rate=half_steps[::2].copy(),
             angle=angle,
             rate_mid=wm.copy(),

@@ -54,3 +54,37 @@ def fixed(value: float | None, decimals: int) -> str:
 def plain(value: float) -> str:
     """Return `value` in up to six digits without trailing zeros, as for an axis or a duration."""
     return f"{value:.6g}"
+
+
+def decimals_for(half_width: float) -> int:
+    """Return how many decimals a number deserves whose 95 % interval has this half width: its first digit is the last
+    that is shown, two where that is a 1; six at the most.
+
+    Parameters
+    ----------
+    half_width : float
+        Above zero, any unit.
+    """
+    power = math.floor(math.log10(half_width))
+    leads_with_one = half_width < 2.0 * 10.0**power
+    return min(max(-power + leads_with_one, 0), 6)
+
+
+def bounded(value: float | None, half_width: float | None, digits: int = 4) -> str:
+    """Return a number with half its 95 % interval, in the digits that this leaves.
+
+    Parameters
+    ----------
+    value : float or None
+        Number, any unit; None gives a dash.
+    half_width : float or None
+        In the same unit; where it is not known the number has `digits` significant digits.
+    digits : int, optional
+        See there.
+    """
+    if value is None or half_width is None or not math.isfinite(half_width):
+        return significant(value, digits)
+    if half_width < 5e-7:
+        return fixed(value, 6)
+    decimals = decimals_for(half_width)
+    return f"{fixed(value, decimals)} ± {fixed(half_width, decimals)}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import colorsys
+import hashlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,13 +16,65 @@ SENSORS = ("#2f86d6", "#1593a5", "#7377e8", "#5b8aa6")
 FILTERS = ("#2f9e58", "#b565d8", "#e2553d", "#c2652a", "#d6588f")
 
 
+# What ships keeps its colour wherever it is shown; any other name has one of its own.
+NAMED = {
+    "sensors/mhd_ars": SENSORS[0],
+    "sensors/mems_gyro": SENSORS[1],
+    "sensors/fog": SENSORS[2],
+    "fusion/kalman": FILTERS[0],
+    "fusion/shakf": FILTERS[1],
+    "fusion/arw_shakf": FILTERS[2],
+    "fusion/arw_shakf_literal": FILTERS[3],
+    "fusion/wideband": FILTERS[4],
+    "fusion/steady_state": "#8f8420",
+    "fusion/complementary": "#a8705a",
+    "fusion/blending": "#6b8f2a",
+    "fusion/allan_srkf": "#9a7398",
+}
+# Hues of names that do not ship, in turns from red on.
+_HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42)}
+# Relative luminance that stands out 3:1 on white and on the viewer's dark background.
+_LUMINANCE = 0.2
+
+
+def color_of(key: str) -> str:
+    """Return the colour of a signal: it belongs to the name, whatever else is shown beside it.
+
+    Parameters
+    ----------
+    key : str
+        ``sensors/<name>`` or ``fusion/<name>``.
+    """
+    if key in NAMED:
+        return NAMED[key]
+    low, high = _HUES[key.split("/", maxsplit=1)[0]]
+    digest = hashlib.sha256(key.encode()).digest()
+    return _with_luminance((low + digest[0] / 256 * (high - low)) % 1.0, 0.35 + digest[1] / 256 * 0.45)
+
+
+def _with_luminance(hue: float, saturation: float) -> str:
+    """Return the colour of a hue that is as light as the others, by bisection."""
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        middle = (low + high) / 2
+        color = "#" + "".join(f"{round(255 * part):02x}" for part in colorsys.hls_to_rgb(hue, middle, saturation))
+        low, high = (middle, high) if luminance(color) < _LUMINANCE else (low, middle)
+    return color
+
+
+def luminance(color: str) -> float:
+    """Return the relative luminance of "#rrggbb" [-], as WCAG 2.2 defines it."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (b / 255 for b in rgb(color))]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
 def series_colors(sensor_names: Sequence[str], fusion_names: Sequence[str]) -> dict[str, str]:
-    """Return the colour of every rate signal; sensors and filters take theirs by order, repeated when they run out.
+    """Return the colour of every rate signal.
 
     Parameters
     ----------
     sensor_names, fusion_names : sequence of str
-        Instances in the order of the scenario.
+        Instances.
 
     Returns
     -------
@@ -28,9 +82,8 @@ def series_colors(sensor_names: Sequence[str], fusion_names: Sequence[str]) -> d
         "#rrggbb" under the keys `commanded`, `truth`, `sensors/<name>` and `fusion/<name>`.
     """
     colors = {"commanded": COMMANDED, "truth": TRUTH}
-    colors |= {f"sensors/{name}": SENSORS[i % len(SENSORS)] for i, name in enumerate(sensor_names)}
-    colors |= {f"fusion/{name}": FILTERS[i % len(FILTERS)] for i, name in enumerate(fusion_names)}
-    return colors
+    keys = [*(f"sensors/{name}" for name in sensor_names), *(f"fusion/{name}" for name in fusion_names)]
+    return colors | {key: color_of(key) for key in keys}
 
 
 def rgb(color: str) -> tuple[int, int, int]:

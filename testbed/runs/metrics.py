@@ -48,11 +48,15 @@ class Entry(BaseModel, Mapping[str, Any]):
 
 
 class LineMetrics(Entry):
-    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, errors [deg/s]."""
+    """What became of one commanded line [Hz]: gain [-] and phase [deg] of estimate over truth, each with half the width
+    of its 95 % interval, and errors [deg/s].
+    """
 
     frequency_hz: float
     gain: float | None = None
+    gain_ci95: float | None = None
     phase_deg: float | None = None
+    phase_ci95_deg: float | None = None
     error_deg_s: float | None = None
     optimum_deg_s: float | None = None
 
@@ -68,11 +72,13 @@ class ConsistencyMetrics(Entry):
 
 class SourceMetrics(Entry):
     """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
-    a filter's is from, `start` what it knew, `gated` what its front part struck out, by sensor, `no_bound` why floor
-    and optimum are missing.
+    a filter's is from, `start` what it knew of its start, `gated` how many readings its front part struck out, by
+    sensor.
     """
 
     belief: str | None = None
+    start: str | None = None
+    gated: dict[str, int] | None = None
     rmse_deg_s: float | None = None
     rmse_aligned_deg_s: float | None = None
     peak_error_deg_s: float | None = None
@@ -81,12 +87,9 @@ class SourceMetrics(Entry):
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
     floor_rmse_deg_s: float | None = None
-    start: str | None = None
-    gated: dict[str, int] | None = None
     prior_floor_rmse_deg_s: float | None = None
     optimum_rmse_deg_s: float | None = None
     optimum_settled_deg_s: float | None = None
-    no_bound: str | None = None
     consistency: ConsistencyMetrics | None = None
 
     def over(self, bound: float | None) -> float | None:
@@ -164,6 +167,16 @@ class Expectation(Entry):
     met: bool
 
 
+class PartSetup(Entry):
+    """A part of the scenario: the preset that it takes, and each `key` that is written beside it with its value `here`
+    and in the `preset`.
+    """
+
+    part: str
+    preset: str | None = None
+    differs: list[dict[str, str | None]] = []
+
+
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
@@ -183,10 +196,12 @@ class RunMetrics(Entry):
     turntable: TurntableMetrics | None = None
     sensors: dict[str, SourceMetrics]
     fusion: dict[str, SourceMetrics]
+    bounds_reason: str | None = None
     floor_density: FloorDensity | None = None
     budget: Budget | None = None
     expectations: list[Expectation] = []
     versions: dict[str, Any] = {}
+    setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []
 
     @property

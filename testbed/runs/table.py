@@ -11,6 +11,8 @@ HEADINGS = ("RMSE", "aligned", "claimed std", "x floor", "x optimum")
 NOTHING = "-"
 # A tenth of the Earth's rate [deg/s].
 _SLOW = 1.5 / 3600.0
+# What the arithmetic of a run leaves of a rate is below this [deg/s].
+_RESOLUTION = 1e-12
 
 
 def error_title(metrics: RunMetrics) -> str:
@@ -21,8 +23,8 @@ def error_title(metrics: RunMetrics) -> str:
 
 
 def error_unit(metrics: RunMetrics) -> tuple[str, float]:
-    """Return the unit of the errors and what deg/s is multiplied by for it: deg/h where all are below a tenth of the
-    Earth's rate.
+    """Return the unit of every rate that is shown of a run and what deg/s is multiplied by for it: deg/h where all
+    errors are below a tenth of the Earth's rate.
     """
     errors = [source.rmse_deg_s for source in (*metrics.sensors.values(), *metrics.fusion.values())]
     known = [error for error in errors if error is not None]
@@ -48,3 +50,19 @@ def error_cells(source: SourceMetrics, scale: float) -> list[str]:
 def number(value: float | None) -> str:
     """Return a number in four digits, a dash for None."""
     return NOTHING if value is None else f"{value:.4g}"
+
+
+def rate_text(value: float | None, unit: tuple[str, float]) -> str:
+    """Return a rate with its unit, or that it is below what the arithmetic resolves.
+
+    Parameters
+    ----------
+    value : float or None
+        Rate [deg/s].
+    unit : tuple of str and float
+        As `error_unit` returns it.
+    """
+    name, scale = unit
+    if value is not None and abs(value) < _RESOLUTION:
+        return f"below {number(scale * _RESOLUTION)} {name}"
+    return f"{number(None if value is None else scale * value)} {name}"

@@ -10,21 +10,30 @@ from testbed.errors import RunError, ScenarioError
 from testbed.inputs.plugins import PluginError, running
 from testbed.models.turntable.floor import Floor
 from testbed.models.turntable.modal import check_modal
-from testbed.models.turntable.servo import required_torque
+from testbed.models.turntable.realisation import grid
+from testbed.models.turntable.servo import count_torque
 from testbed.models.turntable.turntable import Turntable, check_plant
 from testbed.scenario.model import METRICS
+from testbed.scenario.peaks import command_peaks
 from testbed.scenario.step_choice import excerpt, exposed, given_step
 from testbed.sensors import SENSORS
 from testbed.sensors.checked import try_sensor
-from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from testbed.document import Document
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.scenario.model import Scenario
+
+# Samples of the base clock that a run may have.
+MOST_SAMPLES = 1 << 40
+_MOST_PARTS = 64
 
 
 def cross_check(scenario: Scenario, document: Document) -> None:
     """Note in `document` everything that does not fit together in `scenario`."""
+    _check_sizes(scenario, document)
+    if document.problems:
+        return
     _check_times(scenario, document)
     _check_clocks(scenario, document)
     _check_expectations(scenario, document)
@@ -33,6 +42,22 @@ def cross_check(scenario: Scenario, document: Document) -> None:
     _check_filters(scenario, document)
     if not document.problems:
         _check_motion(scenario, document)
+
+
+def _check_sizes(scenario: Scenario, document: Document) -> None:
+    """Refuse what no run could hold, before anything is worked out with it."""
+    duration, base = scenario.frame.duration, scenario.base_rate_hz
+    if not duration * base <= MOST_SAMPLES:
+        most = f"{MOST_SAMPLES / base:.4g} s, {MOST_SAMPLES} samples of the base clock"
+        document.find(("duration",), f"expected at most {most}, got {duration:g} s")
+    for kind, parts in (("sensors", scenario.sensors), ("fusion", scenario.fusion)):
+        if len(parts) > _MOST_PARTS:
+            document.find((kind,), f"expected at most {_MOST_PARTS}, got {len(parts)}")
+    for i, band in enumerate(scenario.turntable.floor.bands):
+        try:
+            grid((band.low, band.high), duration)
+        except ScenarioError as error:
+            document.find(("turntable", "floor", "bands", i), _reasons(error))
 
 
 def _check_times(scenario: Scenario, document: Document) -> None:
@@ -140,7 +165,7 @@ def _check_motion(scenario: Scenario, document: Document) -> None:
     for i, (kind, motion) in enumerate(scenario.motion):
         try:
             with running(f"motion {kind}"):
-                top = float(motion.top_frequency())
+                top, _ = float(motion.top_frequency()), motion.n_term()
         except ScenarioError as error:
             document.adopt(error)
             continue
@@ -159,38 +184,50 @@ def _check_motion(scenario: Scenario, document: Document) -> None:
 
 
 def _check_reach(scenario: Scenario, document: Document) -> None:
-    """Play the commanded motion once, without a plant, and compare its peaks with ranges and torque."""
+    """Compare the peaks of the commanded motion with ranges and torque."""
     try:
-        peak_rate, peak_torque = command_peaks(scenario)
+        peaks = command_peaks(scenario)
     except ScenarioError as error:
-        document.adopt(error)
+        _adopt(error, document)
         return
     except RunError as error:
         document.find(("motion",), str(error))
         return
     for name, sensor in scenario.sensors.items():
-        if peak_rate > sensor.full_scale():
+        if peaks.rate > sensor.full_scale():
             document.find(
                 ("motion",),
-                f"reaches {np.rad2deg(peak_rate):.4g} deg/s, beyond the range of {name}, "
+                f"reaches {np.rad2deg(peaks.rate):.4g} deg/s, beyond the range of {name}, "
                 f"+-{np.rad2deg(sensor.full_scale()):.4g} deg/s: reduce the amplitude",
             )
-    limit = scenario.turntable.torque_limit
-    if scenario.turntable.has_plant and peak_torque > limit:
+    if scenario.turntable.has_plant and peaks.torque > scenario.turntable.torque_limit:
+        _find_torque(scenario.turntable, peaks.torque, document)
+
+
+def _find_torque(parameters: TurntableParameters, torque: float, document: Document) -> None:
+    """Say what asks for more torque than the motor has: the encoder's counts alone, or the motion."""
+    limit, digital = parameters.torque_limit, parameters.digital
+    count = count_torque(parameters)
+    if count > 0.5 * torque:
         document.find(
-            ("motion",),
-            f"needs a torque of {peak_torque:.3g} N m, more than the motor's {limit:g} N m: "
-            "reduce the amplitude or use turntable mode 'ideal'",
+            ("turntable", "digital", "encoder_bits"),
+            f"one count of the encoder, {1e6 * digital.resolution:.3g} urad, times the gain of the loop, "
+            f"{count / digital.resolution:.3g} N m/rad, is a torque of {count:.3g} N m, in all {torque:.3g} N m of the "
+            f"motor's {limit:g} N m, also at standstill: take more bits, or a lower rate_bandwidth or "
+            "position_bandwidth",
         )
+        return
+    document.find(
+        ("motion",),
+        f"needs a torque of {torque:.3g} N m, more than the motor's {limit:g} N m: "
+        "reduce the amplitude or use turntable mode 'ideal'",
+    )
 
 
-def command_peaks(scenario: Scenario) -> tuple[float, float]:
-    """Return the peak commanded rate [rad/s] and the peak torque [N m] that it asks of the motor."""
-    motion = scenario.profile()
-    peak_rate = peak_torque = 0.0
-    for start in range(0, scenario.n_time, BLOCK):
-        command = motion.process(min(BLOCK, scenario.n_time - start))
-        torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
-        peak_rate = max(peak_rate, float(np.max(np.abs(command.rate))))
-        peak_torque = max(peak_torque, float(np.max(np.abs(torque))))
-    return peak_rate, peak_torque
+def _adopt(error: ScenarioError, document: Document) -> None:
+    """Note the findings about another file as they are, those about the motion itself at their place here."""
+    for problem in error.problems:
+        if problem.file:
+            document.problems.append(problem)
+        else:
+            document.find(("motion",), problem.message)

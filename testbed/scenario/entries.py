@@ -23,9 +23,9 @@ def mapping(document: Document, data: Any, key: Key) -> dict[str, Any]:
 
 def is_name(document: Document, name: Any, key: Key) -> bool:
     """Return whether an instance may be called so; the finding is noted if not."""
-    if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+    if isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", name):
         return True
-    document.find(key, f"expected a name of letters, digits and underscores, got {quoted(name)}")
+    document.find(key, f"expected a name of at most 64 letters, digits and underscores, got {quoted(name)}")
     return False
 
 

@@ -148,5 +148,14 @@ class Fusion:
             self._find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
             return None
         read = {str(name): self.intake.validate(SensorBelief, value, (*key, name)) for name, value in written.items()}
-        known = {name: one for name, one in read.items() if one is not None}
+        known = {name: _labelled(one) for name, one in read.items() if one is not None}
         return known if len(known) == len(read) else None
+
+
+def _labelled(one: SensorBelief) -> SensorBelief:
+    """Return a belief as written out, which bears the name of a shipped one only if it is that."""
+    try:
+        shipped = one in load_belief(one.source).values()
+    except ValueError:
+        shipped = False
+    return one if shipped else one.model_copy(update={"source": "given"})

@@ -68,7 +68,7 @@ class Frame(Part):
     bandwidth : float, optional
         Bandwidth W of the noise floor in the metrics [Hz].
     no_rate_below : float, optional
-        Where the rate is known to have nothing below, as in pointing; asks for the floor of such a rate [Hz].
+        The signal is known to have nothing below this [Hz]: then the metrics have a floor with that prior too.
     detail : tuple of two floats, optional
         From when to when the recording holds every sample [s]; two seconds after `settle` if not given, at least 1000
         samples.
@@ -94,9 +94,9 @@ METRICS = (
     "mean_std_deg_s",
     "inside_2_std",
     "floor_rmse_deg_s",
+    "prior_floor_rmse_deg_s",
     "optimum_rmse_deg_s",
     "optimum_settled_deg_s",
-    "prior_floor_rmse_deg_s",
     "missing",
 )
 

@@ -10,9 +10,9 @@ import numpy as np
 from testbed.errors import RunError, ScenarioError
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable.modal import check_modal
-from testbed.models.turntable.servo import required_torque
 from testbed.models.turntable.turntable import Turntable
-from testbed.signals import BASE_RATE_HZ, BLOCK
+from testbed.scenario.peaks import command_peaks
+from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from testbed.models.turntable.parameters import TurntableParameters
@@ -133,7 +133,11 @@ def excerpt(scenario: Scenario, start: int = 0, ramp_in: float = 0.0) -> MotionP
     ramp_in : float, optional
         Ramp-in instead of the scenario's [s].
     """
-    whole, begin = scenario.profile(ramp_in=0.0), start / BASE_RATE_HZ
+    return _part(scenario.profile(ramp_in=0.0), start, ramp_in)
+
+
+def _part(whole: MotionProfile, start: int, ramp_in: float) -> MotionProfile:
+    begin = start / BASE_RATE_HZ
 
     def part(t: FloatArray) -> FloatArray:
         return whole.rate(t + begin)
@@ -187,9 +191,10 @@ class _Excerpts:
         self._n_time = min(_EXCERPT, scenario.n_time)
         # A floor moves on its own: whatever it does, it does under both.
         self._floor = scenario.floor(self._n_time / BASE_RATE_HZ)
-        places, self._scale = _hardest(scenario)
+        peaks = command_peaks(scenario)
+        self._scale, self._motion = peaks.rate, scenario.profile(ramp_in=0.0)
         last = scenario.n_time - self._n_time
-        starts = sorted({min(max(k - self._n_time // 2, 0), last) for k in places})
+        starts = sorted({min(max(k - self._n_time // 2, 0), last) for k in peaks.places})
         self._base = {start: self._play(start, 1) for start in starts}
 
     def error(self, holds: int, *, modal: bool = False) -> float:
@@ -206,22 +211,10 @@ class _Excerpts:
         table = Turntable(
             self._scenario.turntable, mountings, BASE_RATE_HZ, holds=holds, floor=self._floor, modal=modal
         )
-        motion = excerpt(self._scenario, start, _RAMP_IN)
+        motion = _part(self._motion, start, _RAMP_IN)
         command = motion.process(self._n_time)
         return table.process(command, motion.peek(table.lookahead))
 
 
 def _rates(truth: TruthBlock) -> tuple[FloatArray, ...]:
     return truth.rate, truth.encoder_rate, *truth.sensor_rate.values()
-
-
-def _hardest(scenario: Scenario) -> tuple[list[int], float]:
-    """Return the base steps of largest rate, torque and third derivative of the rate, and the largest rate."""
-    motion, peaks, places = scenario.profile(), [-1.0] * 3, [0] * 3
-    for start in range(0, scenario.n_time, BLOCK):
-        command = motion.process(min(BLOCK, scenario.n_time - start))
-        torque = required_torque(scenario.turntable, command, BASE_RATE_HZ)
-        for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
-            if measure.size and float(np.max(measure)) > peaks[i]:
-                peaks[i], places[i] = float(np.max(measure)), start + int(np.argmax(measure))
-    return places, peaks[0]

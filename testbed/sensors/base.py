@@ -8,16 +8,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
-from pydantic import ModelWrapValidatorHandler, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    GetJsonSchemaHandler,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.sensors.data_sheet import Sheet, Word
 from testbed.signals import BASE_RATE_HZ
-from testbed.units import Frequency
+from testbed.units import SampleRate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+    from pydantic_core import core_schema
 
     from testbed.signals import ComplexArray, FloatArray
 
@@ -106,7 +113,7 @@ class Sensor(Part):
 
     words: ClassVar[tuple[Word, ...]] = ()
 
-    sample_rate: Frequency
+    sample_rate: SampleRate
     noise: bool = True
     mounting: Mounting = Mounting()
 
@@ -135,6 +142,22 @@ class Sensor(Part):
     def ways(cls) -> tuple[tuple[tuple[str, ...], ...], ...]:
         """Return, for each quantity that can be said in several ways, the keys of each way."""
         return tuple(((word.key,), (word.field,)) for word in cls.words)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        described = handler(schema)
+        inner = handler.resolve_ref_schema(described)
+        # In the place of a parameter, so none of the two is required.
+        inner["properties"] |= cls.sheet_schema()
+        inner.pop("required", None)
+        return described
+
+    @classmethod
+    def sheet_schema(cls) -> dict[str, Any]:
+        """Return the JSON schema of the keys of data sheets, by name."""
+        return {word.key: word.schema() for word in cls.words}
 
     @model_validator(mode="wrap")
     @classmethod

@@ -73,6 +73,10 @@ class Word:
     unit: str
     shown: str
 
+    def schema(self) -> dict[str, Any]:
+        """Return its JSON schema."""
+        return _described(self.quantity, f"{self.rule}; in place of {self.field}")
+
     def becomes(self, value: float) -> str:
         """Return what a value in SI becomes, in words."""
         shown = value * self.factor / parse(f"1 {self.shown}", self.unit, cycle_is_number="Hz" not in self.unit)
@@ -198,6 +202,17 @@ class Sheet:
 def _line(kind: str, place: tuple[str | int, ...], message: str, value: Any) -> InitErrorDetails:
     error = PydanticCustomError(kind, "{reason}", {"reason": message})
     return InitErrorDetails(type=error, loc=place, input=value)
+
+
+def _described(quantity: Quantity, meaning: str) -> dict[str, Any]:
+    words = f"quantity in {quantity.unit}, {meaning}"
+    return {"type": "string", "description": words, "examples": [quantity.example]}
+
+
+def low_pass_schema() -> dict[str, Any]:
+    """Return the JSON schema of `bandwidth` and `order`."""
+    order = {"type": "integer", "minimum": 1, "maximum": _MOST_POLES, "default": 2, "description": "poles"}
+    return {"bandwidth": _described(_FREQUENCY, "-3 dB, Butterworth; in place of corner and damping"), "order": order}
 
 
 def butterworth(bandwidth: float, order: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
-from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word
+from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word, low_pass_schema
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage, Ramp
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
 # A stated total noise is a typical figure: as far as this from what density and bandwidth make it is no contradiction.
 _TRUSTED = 0.15
-Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1)]
+Coefficients = Annotated[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Field(min_length=1, max_length=33)]
 
 
 def _whole_word(given: dict[str, Any]) -> float:
@@ -83,6 +83,11 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         sheet = super().sheet(values, border=border)
         sheet.translate_low_pass()
         return sheet
+
+    @classmethod
+    def sheet_schema(cls) -> dict[str, Any]:
+        """Return the JSON schema of the keys of data sheets; see `Sensor.sheet_schema`."""
+        return {**super().sheet_schema(), **low_pass_schema()}
 
     @classmethod
     def known_keys(cls) -> list[str]:
@@ -187,8 +192,10 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         stated, made = self.total_rms_noise, self.output_rms()
         if not stated or abs(stated / made - 1.0) <= _TRUSTED:
             return []
-        twice = abs(stated / made / 2.0**0.5 - 1.0) <= _TRUSTED
-        hint = "the density may be two-sided: give it as angle_random_walk" if twice else "see bandwidth and order"
+        hint = "see bandwidth and order"
+        for factor, meaning in ((2.0**0.5, "two-sided: give it as angle_random_walk"), (0.5**0.5, "sqrt(2) too large")):
+            if abs(stated / made / factor - 1.0) <= _TRUSTED:
+                hint = f"the density may be {meaning}"
         stated_deg, made_deg = np.rad2deg([stated, made])
         return [
             f"total_rms_noise is {stated_deg:.4g} deg/s, but density and bandwidth make {made_deg:.4g} deg/s: {hint}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -22,6 +24,14 @@ def leaves(group: Any, words: tuple[str, ...] = ("testbed",)) -> Iterator[tuple[
 
 
 COMMANDS = dict(leaves(typer.main.get_command(app)))
+
+
+def documented() -> dict[str, set[str]]:
+    """Return what docs/commands.md says are the keys of each command's document."""
+    page = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(testbed [^`]*)` \| (.*) \|$", page, flags=re.MULTILINE)
+    # What is said in brackets is inside of a value.
+    return {words: set(re.findall(r"`([^`]*)`", re.sub(r"\([^)]*\)", "", keys))) for words, keys in rows}
 
 
 def arguments(command: Any) -> list[Any]:

@@ -21,7 +21,7 @@ import testbed
 from testbed.cli import main
 from testbed.cli.catalogue import catalogue
 from testbed.cli.options import Output, expanded
-from tests.cli.commands import COMMANDS, arguments, options
+from tests.cli.commands import COMMANDS, arguments, documented, options
 from tests.scenes import short_file
 
 # One prints a document anyway, the other opens a window.
@@ -62,6 +62,13 @@ def is_sentence(text: str) -> bool:
 
 
 @pytest.mark.contract
+def test_every_document_is_on_the_page():
+    assert documented().keys() == COMMANDS.keys() - WITHOUT_TABLE
+    written = {name for name, command in COMMANDS.items() if "--out" in options(command)}
+    assert {name for name, keys in documented().items() if "written" in keys} == written | {"testbed report"}
+
+
+@pytest.mark.contract
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in catalogue().items() for name in names])
 def test_every_summary_is_one_finished_sentence(kind, name):
     summary = catalogue()[kind][name]
@@ -80,6 +87,24 @@ def test_list_says_the_whole_summary_on_a_narrow_terminal(monkeypatch, capsys):
     for names in catalogue().values():
         for summary in names.values():
             assert summary in words
+
+
+def test_a_table_is_folded_or_shortened_on_a_narrow_terminal_never_cut(tmp_path, monkeypatch, capsys, rng):
+    from rich.console import Console
+
+    monkeypatch.chdir(tmp_path)
+    for module in ("allan", "recordings", "understood"):
+        monkeypatch.setattr(f"testbed.cli.{module}.terminal", lambda: Console(width=80, markup=False))
+    np.savetxt("a_long_name.csv", rng.standard_normal(5_000), header="a_long_name_of_a_channel [deg/s]", comments="")
+    for words in (
+        ("allan", "a_long_name.csv", "--rate", "100"),
+        ("log", "inspect", "a_long_name.csv"),
+        ("check", short_file(tmp_path)),
+    ):
+        status, out, _ = say(*words, monkeypatch=monkeypatch, capsys=capsys)
+        assert status == 0
+        assert "…" not in out
+        assert max(len(line) for line in out.splitlines() if "│" in line) <= 80
 
 
 def test_version_is_that_of_the_package(spoken):
@@ -115,6 +140,7 @@ def test_run_prints_its_metrics_as_one_document(tmp_path, monkeypatch, spoken):
     assert status == 0
     document = json.loads(out)
     assert document.pop("written") == "runs/short"
+    assert documented()["testbed run"] == {"metrics.json", "written"}
     assert document == json.loads((tmp_path / "runs" / "short" / "metrics.json").read_text())
     assert "short: " in err, "progress goes to standard error"
 
@@ -152,6 +178,7 @@ def test_check_says_each_key_as_written_and_in_si(tmp_path, spoken):
     status, out, _ = spoken("check", short_file(tmp_path), "--json")
     document = json.loads(out)
     assert status == 0
+    assert document.keys() == documented()["testbed check"]
     assert document["scenario"] == "short"
     assert document["keys"]["motion.0.sine.rate"] == {"written": "1 deg/s", "si": f"{math.radians(1.0)!r} rad/s"}
     assert document["datasheets"]["mems_gyro"]
@@ -161,6 +188,7 @@ def test_check_says_each_key_as_written_and_in_si(tmp_path, spoken):
 def test_list_says_what_the_catalogue_holds(spoken):
     _, out, _ = spoken("list", "--json")
     assert json.loads(out) == catalogue()
+    assert catalogue().keys() == documented()["testbed list"]
 
 
 def test_allan_says_coefficients_and_curve(tmp_path, monkeypatch, spoken, rng):
@@ -170,6 +198,7 @@ def test_allan_says_coefficients_and_curve(tmp_path, monkeypatch, spoken, rng):
     status, out, _ = spoken("allan", "white.csv", "--unit", "deg/s", "--rate", "100 Hz", "--max-tau", "20", "--json")
     assert status == 0
     document = json.loads(out)
+    assert document.keys() == documented()["testbed allan"]
     assert Path(document["written"]) == Path("runs/allan_white.svg")
     assert Path("runs/allan_white.svg").is_file()
     (record,) = document["records"]
@@ -179,6 +208,18 @@ def test_allan_says_coefficients_and_curve(tmp_path, monkeypatch, spoken, rng):
     assert record["fitted_to_s"] <= 20.0 < record["curve"]["tau_s"][-1]
     # deg/sqrt(h) over sqrt(tau = 10 ms in hours) is deg/h.
     assert record["curve"]["deviation_deg_h"][0] == pytest.approx(0.15 / np.sqrt(0.01 / 3600.0), rel=0.03)
+
+
+def test_log_inspect_and_psd_say_what_the_page_says(tmp_path, monkeypatch, spoken, rng):
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("white.csv", rng.standard_normal(5_000), header="w [deg/s]", comments="")
+    status, out, _ = spoken("log", "inspect", "white.csv", "--out", "map.yaml", "--json")
+    document = json.loads(out)
+    assert (status, document["written"]) == (0, "map.yaml")
+    assert document.keys() == documented()["testbed log inspect"]
+    assert Path("map.yaml").is_file()
+    status, out, _ = spoken("psd", "white.csv", "--rate", "100", "--json")
+    assert (status, json.loads(out).keys()) == (0, documented()["testbed psd"])
 
 
 def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
@@ -191,6 +232,7 @@ def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
     monkeypatch.setattr("testbed.reproduce.paper2.report", report)
     status, out, err = spoken("reproduce", "paper2", "--json")
     assert (status, err) == (0, "1 seed\n")
+    assert json.loads(out).keys() == documented()["testbed reproduce"]
     assert json.loads(out) == {
         "paper": "paper2",
         "tables": {

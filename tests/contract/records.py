@@ -36,6 +36,11 @@ def built(name: str, **parameters: Any) -> Any:
     return METHODS[name](BELIEF, RATES, METHODS[name].Parameters(**parameters))
 
 
+def from_rest(name: str) -> dict[str, str]:
+    """Return the parameter that tells a filter, if it can be told, that the record begins at rest."""
+    return {"start": "rest"} if "start" in METHODS[name].Parameters.model_fields else {}
+
+
 def sines(*lines: tuple[float, float], duration: float) -> FloatArray:
     """Return the sum of (frequency [Hz], amplitude [deg/s]) at 20 kHz [rad/s]."""
     t = np.arange(round(duration * RATES["mhd_ars"])) / RATES["mhd_ars"]

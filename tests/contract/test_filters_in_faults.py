@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from testbed.fusion import estimate
-from tests.contract.records import DEG, METHODS, NAMES, RATES, named, readings_of, sines
+from tests.contract.records import DEG, METHODS, NAMES, RATES, from_rest, named, readings_of, sines
 
 FULL_SCALE = {"mhd_ars": 10.0 * DEG, "mems_gyro": 500.0 * DEG}
 LENGTH, BEGIN, END = 1.5, 0.30, 0.31  # of the record and the fault [s]
@@ -28,15 +28,13 @@ def readings():
     return rate, readings_of(rate, 1)
 
 
-def from_rest(name, spoilt):
-    """Return the estimate of a filter that knows, where it can, that the record begins at rest."""
-    known = {"start": "rest"} if "start" in METHODS[name].Parameters.model_fields else {}
-    return estimate(named(name), spoilt, sample_rate_hz=RATES, **known)
+def estimated(name, spoilt):
+    return estimate(named(name), spoilt, sample_rate_hz=RATES, **from_rest(name))
 
 
 @functools.cache
 def fault_free(name):
-    return from_rest(name, readings()[1])
+    return estimated(name, readings()[1])
 
 
 def every_second(z, a, b, full_scale):
@@ -97,7 +95,7 @@ def estimate_with(fault, name, sensor, begin=BEGIN):
     a, b = round(begin * RATES[sensor]), round((begin + END - BEGIN) * RATES[sensor])
     fault(spoilt[sensor], a, b, FULL_SCALE[sensor])
     given = spoilt[sensor][np.isfinite(spoilt[sensor])] - readings()[1][sensor][np.isfinite(spoilt[sensor])]
-    return from_rest(name, spoilt), np.abs(given).max()
+    return estimated(name, spoilt), np.abs(given).max()
 
 
 def check_sane(block):

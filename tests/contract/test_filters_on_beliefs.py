@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -11,17 +12,19 @@ from testbed.fusion.belief import load_belief
 from testbed.parts import preset, preset_names
 from testbed.scenario.beliefs import belief_of
 from testbed.sensors import load_preset
-from tests.contract.records import BELIEF, DEG, METHODS, NAMES, RATES, readings_of, sines
+from tests.contract.records import BELIEF, DEG, METHODS, NAMES, RATES, from_rest, readings_of, sines
 
 PRESETS = {name: preset("testbed.sensors", name)["type"] for name in preset_names("testbed.sensors")}
 FAST = [name for name, kind in PRESETS.items() if kind == "mhd_ars"]
 # What sees a constant rate: a sensor that sees only a band, as an MHD ARS does, is no partner for one.
 SLOW = [name for name in PRESETS if abs(load_preset(name).response(np.array([1e-6]))[0]) > 0.5]
-# Shipped beliefs whole, each data sheet's gyro beside equation (39)'s MHD ARS, and all pairs of instruments exactly.
+# Shipped beliefs whole, each data sheet's gyro beside equation (39)'s MHD ARS, and each instrument exactly beside one
+# of the other kind.
 CASES = [
     *("eq39", "identified", "swept", "paper2"),
     *(f"eq39 and {slow}" for slow in SLOW if "belief" in preset("testbed.sensors", slow)),
-    *(f"exactly {fast} and {slow}" for fast in FAST for slow in SLOW),
+    *(f"exactly sx300 and {slow}" for slow in SLOW),
+    *(f"exactly {fast} and adis16505_filtered" for fast in FAST if fast != "sx300"),
 ]
 
 pytestmark = pytest.mark.contract
@@ -57,24 +60,27 @@ def test_it_is_built_or_says_what_it_expects(name, case_name):
 
 
 def test_hardly_anything_is_refused():
-    """Who refuses everything would pass above: all but an inverse of the fibre-optic gyro's mean over 2.5 ms works."""
+    """Who refuses everything would pass above: all but an inverse of an optical gyro's mean over its interval works."""
     refused = {(name, case_name.split()[-1]) for name in NAMES for case_name in CASES if refusal(name, case_name)}
-    assert refused == {("complementary", "fog_paper3")}
+    assert refused == {("complementary", name) for name, kind in PRESETS.items() if kind == "fog"}
 
 
 @pytest.mark.parametrize("case_name", CASES)
 @pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].needs_both])
 def test_a_fixed_pair_of_paths_follows_a_sine_with_any_of_them(name, case_name):
-    """What it is designed from differs most from belief to belief: 1 deg/s at 10 Hz is met as claimed."""
+    """What it is designed from differs most from belief to belief: 1 deg/s at 10 Hz is met as claimed, or to a
+    thousandth where the claim is less.
+    """
     belief, rates = case(case_name)
     rate = sines((10.0, 1.0), duration=1.5)
     if refusal(name, case_name):
         pytest.skip("refused")
-    stage = METHODS[name](belief, rates, METHODS[name].Parameters())
+    stage = METHODS[name](belief, rates, METHODS[name].Parameters(**from_rest(name)))
     block = stage.process(readings_of(rate, 1, belief, rates))
-    error = (block.rate - rate)[10_000:]
-    assert np.sqrt(np.mean(error**2)) < 0.01 * DEG
-    assert np.mean((error / block.std[10_000:]) ** 2) < 2.0
+    error, claimed = (np.sqrt(np.mean(x[10_000:] ** 2)) for x in (block.rate - rate, block.std))
+    # In proportion for a gyro of more than 1 deg/sqrt(h).
+    assert error < 0.01 * DEG * max(1.0, 60.0 * belief["mems_gyro"].input_noise / DEG)
+    assert error < max(math.sqrt(2.0) * claimed, 1e-3 * DEG)
 
 
 @pytest.mark.parametrize("case_name", ["eq39 and adis16505", "exactly sx300 and adis16505"])

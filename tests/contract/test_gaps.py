@@ -7,9 +7,9 @@ import functools
 import numpy as np
 import pytest
 
-from testbed.fusion import FILTERS, estimate
-from testbed.parts import resolve
+from testbed.fusion import estimate
 from testbed.signals import FloatArray, random_stream
+from tests.contract.records import METHODS, NAMES, named
 from tests.records import DEG, FS, RATES, record, rms
 
 pytestmark = pytest.mark.contract
@@ -30,7 +30,7 @@ def clean() -> tuple[FloatArray, dict[str, FloatArray]]:
 
 
 def run(name: str, readings: dict[str, FloatArray], **parameters: object):
-    return estimate(name, readings, sample_rate_hz=RATES, belief="identified", **parameters)
+    return estimate(named(name), readings, sample_rate_hz=RATES, belief="identified", **parameters)
 
 
 def lost(which: str, gap: float | str, place: str, seconds: float) -> dict[str, FloatArray]:
@@ -62,7 +62,7 @@ def check_sane(block) -> None:
     + [(1.0, place, 3.0) for place in PLACES]
     + [("random", "middle", 2.0)],
 )
-@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_no_gap_makes_a_filter_unstable(name: str, gap: float | str, place: str, seconds: float, which: str) -> None:
     """Inside a gap a filter extrapolates: an order of 3 at most by what a second of the motion's own acceleration comes
     to, A (1 + w t + (w t)^2 / 2) with w t = 19. What is left half a second after it is of the motion's own size.
@@ -70,7 +70,7 @@ def test_no_gap_makes_a_filter_unstable(name: str, gap: float | str, place: str,
     block = run(name, lost(which, gap, place, seconds))
     check_sane(block)
     error = np.abs(block.rate - clean()[0][: block.rate.size])
-    if name == "shakf" and place == "start":
+    if METHODS[name].blames_the_other and place == "start":
         # (17) takes the innovations of an unknown start for noise of the other sensor: bounded by that start alone.
         assert error.max() <= 20.0 * AMPLITUDE
         return
@@ -83,7 +83,7 @@ def test_no_gap_makes_a_filter_unstable(name: str, gap: float | str, place: str,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["mhd_ars", "mems_gyro", "both"])
-@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_ten_seconds_without_a_sensor_are_survived(name: str, which: str) -> None:
     block = run(name, lost(which, 10.0, "middle", LENGTH))
     check_sane(block)
@@ -93,8 +93,6 @@ def test_ten_seconds_without_a_sensor_are_survived(name: str, which: str) -> Non
         assert error.max() <= 2.0 * AMPLITUDE
 
 
-# Largest error in the second of the fault [deg/s]; shakf is exempt from claims.
-WITHIN = dict.fromkeys(FILTERS, 1.5) | dict.fromkeys(("kalman", "wideband", "steady_state", "arw_shakf"), 0.4)
 FAULTS = {
     "mhd lost": ("mhd_ars", np.nan),
     "mhd at 0": ("mhd_ars", 0.0),
@@ -104,6 +102,8 @@ FAULTS = {
     "gyro at its rail": ("mems_gyro", 500.0 * DEG),
     "gyro at 2000": ("mems_gyro", 2000.0 * DEG),
 }
+# All but what runs without the front part, as printed.
+GATED = [name for name in NAMES if METHODS[name].Parameters().gate]
 BEGIN, END, AFTER = 7.0, 8.0, 11.0
 
 
@@ -122,17 +122,18 @@ def undisturbed(name: str):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("name", [name for name in FILTERS if name != "arw_shakf_literal"])
+@pytest.mark.parametrize("name", GATED)
 def test_a_lying_sensor_is_as_good_as_a_lost_one(name: str, fault: str) -> None:
-    """One second of fault in 3 Hz, 1 deg/s; `arw_shakf_literal` runs without the front part, as printed."""
+    """One second of fault in 3 Hz, 1 deg/s."""
     block, rate = run(name, spoilt(fault)), clean()[0]
     check_sane(block)
     error, std = (block.rate - rate) / DEG, block.std / DEG
     inside, after = slice(round(BEGIN * FS), round(END * FS)), slice(round(AFTER * FS), None)
-    assert np.abs(error[inside]).max() <= WITHIN[name]
+    within, left = np.array(METHODS[name].fault_leaves) / DEG
+    assert np.abs(error[inside]).max() <= within
     usual = rms((undisturbed(name).rate - rate)[after]) / DEG
-    assert rms(error[after]) <= max(0.1, 1.2 * usual)
-    if name != "shakf":
+    assert rms(error[after]) <= max(left, 1.2 * usual)
+    if not METHODS[name].blames_the_other:
         assert rms((error / std)[inside]) <= 5.0
         assert rms((error / std)[inside.stop :]) <= 5.0
     # One second of readings, but for the repetitions that have to come before a stuck sensor shows.
@@ -142,7 +143,7 @@ def test_a_lying_sensor_is_as_good_as_a_lost_one(name: str, fault: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in FILTERS if name != "arw_shakf_literal"])
+@pytest.mark.parametrize("name", GATED)
 def test_clean_readings_pass_the_front_part(name: str) -> None:
     with_gate, without = undisturbed(name), run(name, clean()[1], gate=False)
     assert all(with_gate.diagnostics[f"gated_{sensor}"][-1] == 0.0 for sensor in RATES)
@@ -150,5 +151,4 @@ def test_clean_readings_pass_the_front_part(name: str) -> None:
 
 
 def test_only_the_literal_form_runs_without_the_front_part() -> None:
-    off = [name for name in FILTERS if not resolve("filter", name, FILTERS).Parameters().gate]
-    assert off == ["arw_shakf_literal"]
+    assert set(NAMES) - set(GATED) == {"arw_shakf_literal"}

@@ -5,45 +5,33 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.fusion import FILTERS, estimate
-from testbed.parts import resolve
+from testbed.fusion import estimate
+from tests.contract.records import METHODS, NAMES, named
 from tests.records import DEG, FS, RATES, cut, judged, long_record, mixed, offset_mixed, ramped, record, rms
 
 pytestmark = pytest.mark.contract
 
-# Largest rms error 10 to 14 s after a start in mid-motion and inside 6 deg/s [deg/s], and the claims over the error.
-# The benchmark of the same name runs five phases and 20 seeds against the same limits.
-LIMITS = {
-    "kalman": (0.0045, 0.0045),
-    "steady_state": (0.0045, 0.0045),
-    "wideband": (0.0045, 0.0045),
-    "arw_shakf": (0.0045, 0.0045),
-    "arw_shakf_literal": (0.0045, 0.0045),
-    "shakf": (0.0045, 0.0045),
-    "allan_srkf": (0.007, 0.007),
-    "complementary": (0.05, 0.1),
-    "blending": (0.05, 0.1),
-}
-HONEST = ("kalman", "steady_state", "wideband", "arw_shakf")
+# The benchmark of the same name runs five phases and 20 seeds against the limits that the filters declare.
+PROMISING = [name for name in NAMES if METHODS[name].start_leaves is not None]
 
 
 def taking_start() -> list[str]:
-    return [name for name in FILTERS if "start" in resolve("filter", name, FILTERS).Parameters.model_fields]
+    return [name for name in NAMES if "start" in METHODS[name].Parameters.model_fields]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", taking_start())
+@pytest.mark.parametrize("name", PROMISING)
 def test_a_record_may_begin_in_mid_motion_or_inside_a_constant_rate(name: str) -> None:
     """Two seeds, one phase each; a claim over an error of two independent runs is within 2.5 of its mean."""
-    found = {}
+    found, limits = {}, np.array(METHODS[name].start_leaves) / DEG
     for label, motion in (("motion", mixed), ("constant", offset_mixed)):
         runs = [judged(name, *cut(*long_record(motion, 19.5, seed), 5.0 + 0.4 * seed), 10.0, 14.0) for seed in (1, 2)]
         found[label] = [rms(np.array(column)) for column in zip(*runs, strict=True)]
     # Scatter of two runs: their mean square is within 3.5 of its expectation with a probability of 0.97 (chi-square
     # of two), so the limits of the mean over 20 seeds are met within sqrt(3.5).
-    assert found["motion"][0] < 1.9 * LIMITS[name][0]
-    assert found["constant"][0] < 1.9 * LIMITS[name][1]
-    if name in HONEST:
+    assert found["motion"][0] < 1.9 * limits[0]
+    assert found["constant"][0] < 1.9 * limits[1]
+    if not METHODS[name].dishonest and not METHODS[name].needs_both:
         assert 0.7 / 1.9 < found["motion"][1] / found["motion"][0] < 1.4 * 2.5
 
 
@@ -53,7 +41,7 @@ def test_a_declared_rest_is_a_start_at_the_rate_of_rest(name: str) -> None:
     rate, readings = record(lambda t: np.full(t.size, 6e-5), 0.2, 1, {"mhd_ars": {"noise": False}})
     readings["mems_gyro"] = np.full(readings["mems_gyro"].size, 6e-5 * 15.626 / 15.444)
     told, unknown = (
-        estimate(name, readings, sample_rate_hz=RATES, belief="eq39", start=start, rest_rate=6e-5)
+        estimate(named(name), readings, sample_rate_hz=RATES, belief="eq39", start=start, rest_rate=6e-5)
         for start in ("rest", "unknown")
     )
     assert np.max(np.abs(told.rate - rate)) < 1e-3 * 6e-5

@@ -13,6 +13,7 @@ from testbed.cli.app import app
 from testbed.drift.records import Columns, read_thermal
 from testbed.drift.session import read_model
 from testbed.errors import ScenarioError
+from tests.cli.commands import documented
 
 FOG = Path(__file__).parents[2] / "scenarios" / "fog"
 DEG_H = np.radians(1.0) / 3600.0
@@ -119,11 +120,13 @@ def test_each_command_says_its_result_to_a_program(cycles, model, tmp_path):
 
     out = tmp_path / "model.json"
     found = document("train", cycles / "up", cycles / "down", "--out", out)
+    assert found.keys() == documented()["testbed compensate train"]
     assert found["cycles"] == ["up, fog", "down, fog"]
     assert found["blocked_error_deg_h"] == pytest.approx(read_model(out).blocked_error / DEG_H)
     assert found["written"] == str(out)
     assert out.read_text() == model.read_text()
     found = document("apply", model, cycles / "unseen", "--out", tmp_path / "plain.csv")
+    assert found.keys() == documented()["testbed compensate apply"]
     share = np.genfromtxt(tmp_path / "plain.csv", delimiter=",", names=True)["extrapolated"].mean()
     assert (found["record"], found["method"]) == ("unseen, fog", "gradient")
     assert found["extrapolated"] == pytest.approx(share)

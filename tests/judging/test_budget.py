@@ -9,8 +9,6 @@ from testbed.judging.budget import (
     budget_summary,
     crossovers,
     noise_budget,
-    signal_optima,
-    signal_optimum,
 )
 from testbed.metrics.errors import floor_density, floor_rmse
 from testbed.scenario.beliefs import believed
@@ -94,12 +92,6 @@ def test_a_crossing_above_a_better_third_sensor_is_none():
     assert budget_summary(psds, 100.0)["crossovers_hz"] == pytest.approx([1.0], rel=1e-4)
 
 
-def test_optimum_of_each_line_alone_is_below_that_of_both():
-    lines = [(0.5, DEG), (100.0, DEG)]
-    both, slow, fast = signal_optima(SENSORS, RATES, [lines, *([line] for line in lines)])
-    assert slow.rmse < fast.rmse < both.rmse
-
-
 @pytest.mark.parametrize("edges", [[1.0], [0.0, 1.0], [2.0, 1.0]])
 def test_edges_that_make_no_bands_are_refused(edges):
     with pytest.raises(ValueError, match="edges_hz: expected"):
@@ -115,22 +107,6 @@ def test_an_instrument_is_believed_to_be_what_it_is():
     assert gyro.input_noise == pytest.approx(0.15 / 60.0 * DEG, rel=0.02, abs=0.0)
     assert mhd.output_noise == pytest.approx(1e-7, rel=0.02, abs=0.0)
     assert mhd.input_noise < 1e-9
-
-
-@pytest.mark.oracle
-def test_what_the_belief_leaves_out_of_a_sensor_is_its_coloured_noise():
-    """Of `sx300` 1/f with a knee of 0.1 Hz: (1e-7)^2 times 0.1 Hz / f on the reading, less the 2 % at most by which the
-    white fit is off.
-    """
-    mhd = SENSORS["mhd_ars"]
-    freq = np.array([0.001, 0.01, 0.1, 0.5])
-    np.testing.assert_allclose(believed(mhd).slow_density(freq) / 1e-14, 0.1 / freq, rtol=0.03)
-
-
-def test_coloured_noise_raises_the_optimum():
-    lines = [(10.0, DEG)]
-    white = signal_optimum(SENSORS, RATES, lines)
-    assert signal_optimum(SENSORS, RATES, lines, coloured=True).rmse > 1.5 * white.rmse
 
 
 def test_a_gyro_that_is_a_resonance_is_believed():

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from testbed.errors import ScenarioError
+from testbed.judging.allan_analysis import analyse
 from testbed.judging.allan_records import read
 from testbed.logs import read_log
 from testbed.logs.selection import Selection
-from tests.logs.kinds import COUNTS, EPOCH_NS, FS, RATE, TIME_US
+from tests.logs.kinds import COUNTS, EPOCH_NS, FS, RATE, TIME_US, N
 
 SECONDS = TIME_US / 1e6
 
@@ -258,6 +259,8 @@ def test_every_format_gives_its_samples_whatever_its_name(tmp_path, write, optio
     (record,) = read(path, Selection(**options))
     np.testing.assert_allclose(record.rate, np.deg2rad(expected), rtol=4.0 * accuracy, atol=2.0 * accuracy)
     assert record.sample_rate_hz == pytest.approx(FS, rel=1e-6)
+    found = analyse(record).fit.angle_random_walk
+    assert found.lower < N < found.upper
 
 
 @pytest.mark.parametrize("write", [row[0] for row in FORMATS], ids=lambda v: v.__name__)

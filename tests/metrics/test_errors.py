@@ -33,6 +33,8 @@ def test_rmse_includes_the_phase():
         {
             "frequency_hz": 10.0,
             "gain": pytest.approx(1.0, abs=1e-12),
+            "gain_ci95": None,
+            "phase_ci95_deg": None,
             "phase_deg": pytest.approx(np.rad2deg(phi), abs=1e-10),
             # One line and nothing else: all of the error.
             "error_deg_s": pytest.approx(np.rad2deg(np.sqrt(1 - np.cos(phi))), rel=1e-9),
@@ -84,7 +86,8 @@ def test_without_lines_aligned_is_undefined():
 
 def test_a_line_that_is_not_in_the_truth_has_no_gain():
     result = judged(tone(1.0, 5.0), np.zeros(T.size), (5.0,)).result()
-    assert result["lines"] == [{"frequency_hz": 5.0, "gain": None, "phase_deg": None, "error_deg_s": None}]
+    unknown = dict.fromkeys(("gain", "gain_ci95", "phase_deg", "phase_ci95_deg", "error_deg_s"))
+    assert result["lines"] == [{"frequency_hz": 5.0, **unknown}]
     assert result["rmse_aligned_deg_s"] is None
 
 

@@ -5,9 +5,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH, mix, rgb, series_colors
+from testbed.fusion import FILTERS as REGISTERED
+from testbed.pages.palette import COMMANDED, FILTERS, NAMED, SENSORS, TRUTH, color_of, mix, rgb, series_colors
+from testbed.sensors import SENSORS as INSTRUMENTS
 
-COLORS = (COMMANDED, TRUTH, *SENSORS, *FILTERS)
+OWN = [f"{kind}/name_{i}" for kind in ("sensors", "fusion") for i in range(40)]
+COLORS = sorted({COMMANDED, TRUTH, *SENSORS, *FILTERS, *NAMED.values(), *map(color_of, OWN)})
 
 
 def luminance(color):
@@ -31,14 +34,27 @@ def test_colors_of_the_usual_run_are_far_apart():
         assert np.linalg.norm(np.subtract(rgb(one), rgb(other))) > 35, (one, other)
 
 
-def test_series_colors_go_by_order_and_start_again():
-    filters = [f"f{i}" for i in range(len(FILTERS) + 1)]
-    colors = series_colors(["a", "b"], filters)
-    assert colors["commanded"] == COMMANDED
-    assert colors["truth"] == TRUTH
-    assert colors["sensors/b"] == SENSORS[1]
-    assert colors["fusion/f0"] == colors[f"fusion/{filters[-1]}"] == FILTERS[0]
-    assert len(colors) == 2 + 2 + len(filters)
+def test_a_colour_belongs_to_a_name_not_to_a_position():
+    one = series_colors(["mhd_ars", "mine"], ["kalman", "shakf", "my_filter"])
+    other = series_colors(["mine", "mems_gyro"], ["my_filter", "wideband", "kalman"])
+    assert one["commanded"] == COMMANDED
+    assert one["truth"] == TRUTH
+    for key in set(one) & set(other):
+        assert one[key] == other[key]
+    assert len(one) == 2 + 2 + 3
+
+
+def test_what_ships_has_a_colour_of_its_own():
+    shipped = [*(f"sensors/{name}" for name in INSTRUMENTS), *(f"fusion/{name}" for name in REGISTERED)]
+    colors = [color_of(key) for key in shipped]
+    for one, other in combinations(colors, 2):
+        assert np.linalg.norm(np.subtract(rgb(one), rgb(other))) > 30, (one, other)
+
+
+def test_names_of_ones_own_are_told_apart_and_keep_to_the_hues_of_their_kind():
+    assert len({color_of(key) for key in OWN}) > 0.9 * len(OWN)
+    sensors = [rgb(color_of(key)) for key in OWN if key.startswith("sensors/")]
+    assert all(blue > red for red, _, blue in sensors)
 
 
 def test_mix_ends_at_its_two_colors():

@@ -77,7 +77,15 @@ def test_metrics_json_has_the_documented_form_and_no_nan(stored):
     } <= metrics.keys()
     for entry in metrics["fusion"].values():
         assert {"rmse_deg_s", "rmse_aligned_deg_s", "floor_rmse_deg_s", "optimum_rmse_deg_s", "lines"} <= entry.keys()
-        assert entry["lines"][0].keys() == {"frequency_hz", "gain", "phase_deg", "error_deg_s", "optimum_deg_s"}
+        assert entry["lines"][0].keys() == {
+            "frequency_hz",
+            "gain",
+            "gain_ci95",
+            "phase_deg",
+            "phase_ci95_deg",
+            "error_deg_s",
+            "optimum_deg_s",
+        }
     assert 0.0 < metrics["fusion"]["kalman"]["optimum_rmse_deg_s"] < metrics["fusion"]["kalman"]["rmse_deg_s"]
 
 

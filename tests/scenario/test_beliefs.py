@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import statistics
 
 import numpy as np
@@ -145,6 +146,22 @@ def test_every_output_declares_the_belief(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "belief of kalman: exact\n" in printed
     assert f"belief of arw_shakf: {own}\n" in printed
+
+
+def test_a_belief_as_written_bears_no_name_but_its_own(tmp_path):
+    """The exact belief of another instrument is not exact, and a changed number makes a shipped belief another."""
+    gyro = belief_of("adis16505_filtered")
+    for source, numerator, wanted in (
+        ("eq39", gyro.numerator, "eq39"),
+        ("eq39", (150.0, 15.0), "given"),
+        ("exact", gyro.numerator, "given"),
+        ("nobody", gyro.numerator, "given"),
+    ):
+        changed = gyro.model_copy(update={"source": source, "numerator": numerator})
+        # JSON is YAML.
+        written = json.dumps(changed.model_dump(mode="json", context={"border": True}, exclude_none=True))
+        own = f"kalman: {{belief: {{mems_gyro: {written}, mhd_ars: {written}}}}}"
+        assert short(tmp_path, ("kalman: {}", own)).fusion["kalman"].belief["mems_gyro"].source == wanted
 
 
 def test_a_sensor_entry_has_no_belief_of_its_own(tmp_path):

@@ -143,6 +143,7 @@ def test_order_needs_its_bandwidth() -> None:
         ("0.0522 dps", None),
         ("0.05 dps", None),
         ("0.0738 dps", "may be two-sided"),
+        ("0.0369 dps", "may be sqrt(2) too large"),
         ("0.2 dps", "see bandwidth and order"),
     ],
 )
@@ -246,6 +247,30 @@ def test_a_part_has_no_contradiction_and_a_belief_of_its_own_sheet(name: str) ->
     made = sensor.input_noise_psd(freq) * np.abs(sensor.response(freq)) ** 2
     above = freq > 10.0
     assert np.abs(claimed / made - 1.0)[above].max() < 0.04
+
+
+def test_the_schema_knows_the_words() -> None:
+    from testbed.scenario.schema import schema
+
+    entries = schema()["properties"]["sensors"]["additionalProperties"]["anyOf"]
+    properties = {entry["properties"]["type"]["const"]: entry["properties"] for entry in entries}
+    assert {*SHEET, "order", "total_rms_noise", "sensitivity"} <= set(properties["mems_gyro"])
+    assert {"output_rate", "full_scale", "rate_noise_density"} <= set(properties["fog"])
+    assert "one-sided" in properties["mems_gyro"]["rate_noise_density"]["description"]
+
+
+def test_list_parts_shows_their_figures(capsys: Any) -> None:
+    from testbed.cli.part_figures import part_figures, print_part_figures
+
+    figures = part_figures()
+    assert set(REAL) <= set(figures)
+    mpu = figures["mpu6050"]
+    assert (mpu["noise_density_mdps_sqrt_hz"], mpu["angle_random_walk_deg_sqrt_h"]) == (5.0, 0.212)
+    assert mpu["bandwidth_hz"] == pytest.approx(98.0, rel=5e-3)
+    assert (mpu["bias_floor_deg_h"], mpu["output_rate_hz"], mpu["belief"]) == (10.0, 1000.0, "data_sheet")
+    print_part_figures(figures)
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in figures)
 
 
 def test_the_rms_sees_a_planted_two_sided_density(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,6 @@ independently.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,19 +15,14 @@ import numpy as np
 from testbed.fusion.model import FusionModel, build_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
-    from testbed.fusion.start import StartKind
     from testbed.signals import ComplexArray, FloatArray
 
 # Decades of q [rad^2/s^(2m+1)] that are searched, per order m: from a filter slower than the crossover of the sensors
 # to one beyond 1 kHz.
 DECADES = {1: (-10, 4), 2: (-8, 12), 3: (-6, 17)}
-# Where noise beyond the model's is looked for: 1/f is above the white noise below some hertz only.
-_COLOURED_HZ = np.logspace(-5.0, 2.0, 71)
 # 2^40 periods are past any time constant.
 _DOUBLINGS = 40
 
@@ -57,7 +51,7 @@ class FixedFilters:
     @property
     def std(self) -> FloatArray:
         """What each filter claims: the mean over the cycle of its settled standard deviation [rad/s], shape (n_q,)."""
-        std: FloatArray = np.sqrt(np.maximum(self.posterior()[:, :, 0, 0].mean(axis=0), 0.0))
+        std: FloatArray = np.sqrt(self.posterior()[:, :, 0, 0].mean(axis=0))
         return std
 
     def posterior(self) -> FloatArray:
@@ -78,9 +72,9 @@ class FixedFilters:
         model, steps = self.model, len(self.K)
         keep = np.eye(model.F.shape[0]) - self.K @ model.H
         parts = []
-        for i in range(len(model.sensors)):
-            mine = model.owners == i
-            Q = np.where(np.outer(mine, mine), model.Q, 0.0)
+        for i, states in enumerate(_states_of(model)):
+            Q = np.zeros_like(model.Q)
+            Q[states, states] = model.Q[states, states]
             column = self.K[..., i]
             W = keep @ Q @ _t(keep) + model.R[i] * column[..., :, None] * column[..., None, :]
             M = keep @ model.F
@@ -138,38 +132,9 @@ class FixedFilters:
             gains.append(X[..., 0])
         return np.array(gains)
 
-    def coloured_variance(self, excess: Sequence[Callable[[FloatArray], FloatArray] | None]) -> FloatArray:
-        r"""Return the error variance from noise on the readings that the model does not have [rad^2/s^2], shape
-        (n_sensor, n_q).
-
-        .. math:: 2 \int |T_i(f)|^2 S_i(f) df
-
-        with T_i from the reading of sensor i to the estimate; trapezoid in ln f, 1e-5 to 100 Hz, taken as constant
-        below.
-
-        Parameters
-        ----------
-        excess : sequence of callable or None
-            Two-sided density S of each sensor's reading beyond the model's white noise, Hz -> rad^2/s; None for none.
-        """
-        variance = np.zeros((len(excess), self.q.size))
-        for i, psd in enumerate(excess):
-            if psd is not None:
-                only = np.zeros((len(excess), _COLOURED_HZ.size), complex)
-                only[i] = 1.0
-                passed = np.mean(np.abs(self.gain(_COLOURED_HZ, only)) ** 2, axis=0) * psd(_COLOURED_HZ)
-                tail = passed[:, 0] * _COLOURED_HZ[0]
-                variance[i] = 2.0 * (np.trapezoid(passed * _COLOURED_HZ, np.log(_COLOURED_HZ), axis=1) + tail)
-        return variance
-
 
 def settled_filters(
-    belief: Mapping[str, SensorBelief],
-    sample_rate_hz: Mapping[str, float],
-    *,
-    order: int,
-    q: FloatArray,
-    coloured: bool = False,
+    belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], *, order: int, q: FloatArray
 ) -> FixedFilters:
     """Solve the periodic Riccati equation for every q.
 
@@ -183,8 +148,6 @@ def settled_filters(
         Order m of the signal model.
     q : ndarray, shape (n_q,)
         Signal noise [rad^2/s^(2m+1)].
-    coloured : bool, optional
-        The filters know of the slow noise, too; a constant such as the turn-on bias they take as known.
 
     Returns
     -------
@@ -200,118 +163,101 @@ def settled_filters(
     ----------
     Chu, Fan, Lin, Wang, Int. J. Control 77 (2004) 767-788 (doubling of the periodic discrete-time Riccati equation).
     """
-    model = build_model(belief, sample_rate_hz, order=order, q=0.0, coloured=coloured)
-    unit = (
-        build_model(belief, sample_rate_hz, order=order, q=1.0).Q
-        - build_model(belief, sample_rate_hz, order=order, q=0.0).Q
-    )
-    if coloured:
-        unit = np.pad(unit, (0, model.n_slow))
+    model = build_model(belief, sample_rate_hz, order=order, q=0.0)
+    unit = build_model(belief, sample_rate_hz, order=order, q=1.0).Q - model.Q
     if np.any(model.R <= 0.0):
         msg = f"belief: expected an output_noise above 0 for each of {list(model.sensors)}"
         raise ValueError(msg)
     Q = model.Q + np.asarray(q)[:, None, None] * unit
-    due = _due(model)
-    P = _cycle_start(model, Q, due)
-    prior, gains = [], []
-    for used in due:
-        K = np.zeros((len(P), len(model.F), used.size))
-        h = model.H[used]
-        K[:, :, used] = np.swapaxes(np.linalg.solve(h @ P @ h.T + np.diag(model.R[used]), h @ P), 1, 2)
-        prior.append(P)
-        gains.append(K)
-        keep = np.eye(len(model.F)) - K @ model.H
-        P = model.F @ (keep @ P @ _t(keep) + (K * model.R) @ _t(K)) @ model.F.T + Q
-    return FixedFilters(model, np.asarray(q, float), np.array(prior), np.array(gains))
-
-
-def _due(model: FusionModel) -> NDArray[np.bool_]:
-    """Return which sensors have a reading at each step of the cycle, shape (n_step, n_sensor)."""
-    return np.array([[p % stride == 0 for stride in model.strides] for p in range(math.lcm(*model.strides))])
-
-
-Map = tuple["FloatArray", "FloatArray", "FloatArray"]
-
-
-def _cycle(model: FusionModel, Q: FloatArray, due: NDArray[np.bool_]) -> Map:
-    """Return (A, G, Q) of the map P -> Q + A P (I + G P)^-1 A' of a whole cycle, readings and steps."""
-    eye = np.eye(len(model.F))
-    cycle = None
-    for used in due:
-        h = model.H[used]
-        G = np.broadcast_to(h.T @ (h / model.R[used, None]), Q.shape)
-        step = (np.broadcast_to(model.F, Q.shape), G, Q)
-        cycle = step if cycle is None else _after(cycle, step, eye)
-    assert cycle is not None
-    return cycle
-
-
-def _cycle_start(model: FusionModel, Q: FloatArray, due: NDArray[np.bool_]) -> FloatArray:
-    """Return the settled prior covariance at step 0 by doubling the map of a cycle."""
-    cycle = _cycle(model, Q, due)
+    period = period_map(model, Q)
     for _ in range(_DOUBLINGS):
-        cycle = _after(cycle, cycle, np.eye(len(model.F)))
-    return cycle[2]
+        period = period.then(period)
+    return filters_from(model, np.asarray(q, float), Q, period.Q)
 
 
-def variance_from_start(
-    belief: Mapping[str, SensorBelief],
-    sample_rate_hz: Mapping[str, float],
-    *,
-    order: int,
-    q: float,
-    start: StartKind,
-    times: Sequence[float],
-) -> FloatArray:
-    """Return the variance of the rate that the Kalman filter has at some times after its start [rad^2/s^2], readings of
-    that instant used, shape (n_time,).
-
-    By doubling the map of a cycle, so that an hour costs no more than a second.
+@dataclass(frozen=True)
+class CycleMap:
+    """The map P -> Q + A P (I + G P)^-1 A' that takes a prior covariance over steps with their readings.
 
     Parameters
     ----------
-    belief, sample_rate_hz : mapping, mapping
-        As for `settled_filters`; the filter knows of the slow noise.
-    order, q : int, float
-        Signal model; q [rad^2/s^(2m+1)].
-    start : {"unknown", "rest"}
-        What is known before the first reading.
-    times : sequence of float
-        [s], rising.
+    A, G, Q : ndarray, shape (n_q, n_state, n_state)
+        One map for each of several filters.
     """
-    model = build_model(belief, sample_rate_hz, order=order, q=q, coloured=True, start=start)
-    due, eye = _due(model), np.eye(len(model.F))
-    maps = [_cycle(model, model.Q, due)]
-    cycles = [round(t * model.sample_rate_hz / len(due)) for t in times]
-    P, at, found = model.P0, 0, []
-    for wanted in cycles:
-        for k in range((wanted - at).bit_length()):
-            if len(maps) == k:
-                maps.append(_after(maps[-1], maps[-1], eye))
-            if (wanted - at) >> k & 1:
-                A, G, Q = maps[k]
-                P = Q + A @ P @ np.linalg.solve(eye + G @ P, A.T)
-        at = wanted
-        g = model.H @ P
-        left = P[0, 0] - g[:, 0] @ np.linalg.solve(g @ model.H.T + np.diag(model.R), g[:, 0])
-        found.append(left)
-    return np.array(found)
+
+    A: FloatArray
+    G: FloatArray
+    Q: FloatArray
+
+    def then(self, other: CycleMap) -> CycleMap:
+        """Return the map of these steps and, after them, those of another."""
+        inverse = np.linalg.inv(np.eye(self.A.shape[-1]) + self.Q @ other.G)
+        A = other.A @ inverse @ self.A
+        G = self.G + _t(self.A) @ other.G @ inverse @ self.A
+        Q = other.Q + other.A @ inverse @ self.Q @ _t(other.A)
+        return CycleMap(A, 0.5 * (G + _t(G)), 0.5 * (Q + _t(Q)))
+
+    def applied(self, P: FloatArray) -> FloatArray:
+        """Return the covariance behind the steps from that before them, shape (n_q, n_state, n_state)."""
+        eye = np.eye(self.A.shape[-1])
+        after: FloatArray = self.Q + self.A @ P @ np.linalg.solve(eye + self.G @ P, _t(self.A))
+        return 0.5 * (after + _t(after))
 
 
-def _after(
-    first: tuple[FloatArray, FloatArray, FloatArray], then: tuple[FloatArray, FloatArray, FloatArray], eye: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (A, G, Q) of two such maps, one after the other."""
-    (A1, G1, Q1), (A2, G2, Q2) = first, then
-    inverse = np.linalg.inv(eye + Q1 @ G2)
-    A = A2 @ inverse @ A1
-    G = G1 + _t(A1) @ G2 @ inverse @ A1
-    Q = Q2 + A2 @ inverse @ Q1 @ _t(A2)
-    return A, 0.5 * (G + _t(G)), 0.5 * (Q + _t(Q))
+def period_map(model: FusionModel, Q: FloatArray) -> CycleMap:
+    """Return the map of one period of the readings, which all sensors begin together.
+
+    Parameters
+    ----------
+    model : FusionModel
+        F, H, R.
+    Q : ndarray, shape (n_q, n_state, n_state)
+        Covariance of a step of each filter [rad^2/s^2].
+    """
+    whole = None
+    for used in model.due:
+        h = model.H[used]
+        G = np.broadcast_to(h.T @ (h / model.R[used, None]), Q.shape)
+        step = CycleMap(np.broadcast_to(model.F, Q.shape), G, Q)
+        whole = step if whole is None else whole.then(step)
+    assert whole is not None
+    return whole
+
+
+def filters_from(model: FusionModel, q: FloatArray, Q: FloatArray, prior: FloatArray) -> FixedFilters:
+    """Return the filters whose gains are those of a period that begins with a covariance.
+
+    Parameters
+    ----------
+    model : FusionModel
+        F, H, R.
+    q : ndarray, shape (n_q,)
+        Signal noise of each filter [rad^2/s^(2m+1)].
+    Q, prior : ndarray, shape (n_q, n_state, n_state)
+        Covariance of a step, and before the first readings of the period [rad^2/s^2].
+    """
+    P, priors, gains = prior, [], []
+    for used in model.due:
+        K = np.zeros((len(P), len(model.F), used.size))
+        h = model.H[used]
+        K[:, :, used] = np.swapaxes(np.linalg.solve(h @ P @ h.T + np.diag(model.R[used]), h @ P), 1, 2)
+        priors.append(P)
+        gains.append(K)
+        keep = np.eye(len(model.F)) - K @ model.H
+        P = model.F @ (keep @ P @ _t(keep) + (K * model.R) @ _t(K)) @ model.F.T + Q
+    return FixedFilters(model, q, np.array(priors), np.array(gains))
 
 
 def _t(matrix: FloatArray) -> FloatArray:
     return np.swapaxes(matrix, -1, -2)
+
+
+def _states_of(model: FusionModel) -> list[slice]:
+    """Return the states of each sensor: they follow the signal's in the order of the sensors, H reading each one's
+    first.
+    """
+    firsts = [int(np.flatnonzero(np.arange(row.size) * (row != 0.0))[0]) for row in model.H]
+    return [slice(a, b) for a, b in zip(firsts, [*firsts[1:], model.F.shape[0]], strict=True)]
 
 
 @dataclass(frozen=True)
@@ -328,8 +274,6 @@ class Optimum:
         Its signal noise [rad^2/s^(2m+1)].
     shares : dict of str to float
         Standard deviation that each sensor's noise causes [rad/s].
-    claimed : float
-        Standard deviation that the filter claims [rad/s].
     """
 
     rmse: float
@@ -338,7 +282,6 @@ class Optimum:
     order: int
     q: float
     shares: dict[str, float]
-    claimed: float
 
 
 def optimum(
@@ -346,7 +289,6 @@ def optimum(
     sample_rate_hz: Mapping[str, float],
     lines: Sequence[tuple[float, float]],
     *,
-    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
 ) -> Optimum:
     r"""Return the fixed filter with the smallest error for a signal made of lines, sensor models exact, after all time
@@ -365,9 +307,6 @@ def optimum(
         Rate of each sensor [Hz].
     lines : sequence of (float, float)
         Frequency [Hz] and amplitude [rad/s] of each line.
-    excess : mapping of str to callable, optional
-        Density of a sensor's reading beyond the belief's white noise (1/f), Hz -> rad^2/s; the filters do not know of
-        it.
     orders : sequence of int, optional
         Orders of the signal model.
 
@@ -376,7 +315,7 @@ def optimum(
     Optimum
         The best filter and its error.
     """
-    return optima(belief, sample_rate_hz, [lines], excess=excess, orders=orders)[0]
+    return optima(belief, sample_rate_hz, [lines], orders=orders)[0]
 
 
 def optima(
@@ -384,45 +323,32 @@ def optima(
     sample_rate_hz: Mapping[str, float],
     signals: Sequence[Sequence[tuple[float, float]]],
     *,
-    excess: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     orders: Sequence[int] = (1, 2, 3),
-    coloured: bool = False,
 ) -> list[Optimum]:
     """Return the `optimum` of each signal; the Riccati equations are solved once for all.
 
     Parameters
     ----------
-    belief, sample_rate_hz, excess, orders : mapping, mapping, mapping, sequence
+    belief, sample_rate_hz, orders : mapping, mapping, sequence
         As for `optimum`.
     signals : sequence of sequence of (float, float)
         Lines of each signal: frequency [Hz] and amplitude [rad/s].
-    coloured : bool, optional
-        The filters know of the slow noise that the belief names; q is then refined to a quarter of a decade.
     """
     freq = np.array([line for lines in signals for line, _ in lines])
     power = np.array([0.5 * amplitude**2 for lines in signals for _, amplitude in lines])
     of_signal = np.repeat(np.eye(len(signals)), [len(lines) for lines in signals], axis=0)
     truth = np.array([belief[name].realisation().response(freq) for name in sample_rate_hz])
     best: list[Optimum | None] = [None] * len(signals)
-
-    def search(order: int, q: FloatArray) -> None:
-        filters = settled_filters(belief, sample_rate_hz, order=order, q=q, coloured=coloured)
-        shares = filters.noise_variance() + filters.coloured_variance(
-            [(excess or {}).get(name) for name in sample_rate_hz]
-        )
+    for order in orders:
+        low, high = DECADES[order]
+        filters = settled_filters(belief, sample_rate_hz, order=order, q=np.logspace(low, high, high - low + 1))
+        shares = filters.noise_variance()
         lags = filters.line_error(freq, truth) ** 2 * power @ of_signal
         for k, lag in enumerate(lags.T):
             found = _least(filters, order, shares, lag)
             known = best[k]
             if known is None or found.rmse < known.rmse:
                 best[k] = found
-
-    for order in orders:
-        low, high = DECADES[order]
-        search(order, np.logspace(low, high, high - low + 1))
-    if coloured:
-        for order, decade in sorted({(one.order, round(math.log10(one.q))) for one in best if one is not None}):
-            search(order, np.logspace(decade - 0.75, decade + 0.75, 7))
     return [one for one in best if one is not None]
 
 
@@ -437,5 +363,4 @@ def _least(filters: FixedFilters, order: int, shares: FloatArray, lag: FloatArra
         order=order,
         q=float(filters.q[i]),
         shares=dict(zip(filters.model.sensors, np.sqrt(shares[:, i]).tolist(), strict=True)),
-        claimed=float(filters.std[i]),
     )

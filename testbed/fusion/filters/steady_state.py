@@ -12,7 +12,7 @@ from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
 from testbed.fusion.kernels.covariance import COUNTS, EVERY, settling_kernel
 from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import initial_state
-from testbed.units import Frequency, Range
+from testbed.units import DEG, Frequency, Range
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,6 +72,8 @@ class SteadyState(BlockFilter):
 
     Parameters: ClassVar[type[Part]] = SteadyStateParameters
     rows = Rows(per_sensor=("innovation", "innovation_variance"))
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
+    fault_leaves = (0.4 * DEG, 0.1 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters

@@ -97,6 +97,7 @@ class TwoPaths(BlockFilter):
     needs_both = True
     # Of the low-pass L at the crossover.
     order: ClassVar[int]
+    start_leaves = (math.radians(0.05), math.radians(0.1))
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters

@@ -29,6 +29,12 @@ if TYPE_CHECKING:
     from testbed.logs.table import Block
 
 _BLOCK = 4 << 20
+# Of times: day before month, and a comma before the fraction of a second; not where commas are between fields.
+_DAY_FIRST = re.compile(rb"\b(\d\d)\.(\d\d)\.(\d{4})([T ]\d\d:)")
+_TIME_COMMA = re.compile(rb"(:\d\d),(\d)")
+# Digits after the point that stamps are exact to.
+_DIGITS = 9
+_MARKS = tuple(mark.encode() for mark in COMMENTS)
 _NULLS = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
 
 
@@ -59,7 +65,10 @@ class TextTable:
         if not head.strip():
             raise refusal(path, "expected a column of numbers, got nothing")
         complete = path.stat().st_size <= len(head)
-        self.dialect: Dialect = find_dialect(path, head, complete=complete, options=options or TextOptions())
+        said = options or TextOptions()
+        self.dialect: Dialect = find_dialect(path, head, complete=complete, options=said)
+        self._nulls = [*_NULLS, said.missing] if said.missing else _NULLS
+        self.unreadable = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind == "text")
         self.format = f"text: {self.dialect}"
         self.header = self.dialect.preamble
         self.columns = self._columns()
@@ -124,9 +133,12 @@ class TextTable:
         if line <= self.dialect.skip:
             for _ in range(self.dialect.skip - line + 1):
                 raw = raw.partition(b"\n")[2]
-        if any(re.search(rb"(^|\n)[ \t]*" + re.escape(mark.encode()), raw) for mark in COMMENTS):
-            kept = [row for row in raw.split(b"\n") if not row.lstrip().startswith(tuple(m.encode() for m in COMMENTS))]
-            raw = b"\n".join(kept)
+        # The search for a letter is quick; lines are looked at one by one only where there is one.
+        if any(mark in raw for mark in _MARKS):
+            raw = b"\n".join(row for row in raw.split(b"\n") if not row.lstrip().startswith(_MARKS))
+        if "iso" in self.dialect.kinds or "clock" in self.dialect.kinds:
+            raw = _DAY_FIRST.sub(rb"\3-\2-\1\4", raw)
+            raw = raw if self.dialect.separator == "," else _TIME_COMMA.sub(rb"\1.\2", raw)
         if self.dialect.separator == " ":
             raw = re.sub(rb"[ \t]+", b" ", raw.replace(b"\r\n", b"\n")).removeprefix(b" ")
             return raw.replace(b"\n ", b"\n").replace(b" \n", b"\n").removesuffix(b" ")
@@ -138,6 +150,10 @@ class TextTable:
         try:
             return self._convert(content, types)
         except pa.ArrowInvalid as error:
+            if any(pa.types.is_decimal(kind) for kind in types.values()):
+                # More digits than that, or an odd field: as floats, which name it.
+                plain = {i: pa.float64() if pa.types.is_decimal(kind) else kind for i, kind in types.items()}
+                return self._parse(content, plain, line, raw, last=last)
             rows, _, end = content.rstrip().rpartition(b"\n")
             if not last or raw.endswith(b"\n") or line + raw.count(b"\n") <= self.dialect.skip + 1:
                 self._refuse_fault(raw, line, types, str(error))
@@ -148,7 +164,7 @@ class TextTable:
         """Return what each column is to become."""
         import pyarrow as pa
 
-        exact = {"integer": pa.int64(), "clock": pa.time64("ns")}
+        exact = {"integer": pa.int64(), "clock": pa.time64("ns"), "number": pa.decimal128(38, _DIGITS)}
         types = {}
         for i in wanted:
             kind = self.dialect.kinds[i]
@@ -171,7 +187,7 @@ class TextTable:
                 column_types={str(i): kind for i, kind in types.items()},
                 include_columns=[str(i) for i in types],
                 decimal_point=dialect.decimal,
-                null_values=_NULLS,
+                null_values=self._nulls,
                 strings_can_be_null=True,
                 check_utf8=False,
             ),
@@ -209,7 +225,7 @@ class TextTable:
     def _refuse_field(self, field: str, index: int, kind: str, line: int) -> None:
         """Refuse a field that is not of its kind, a type of pyarrow by name."""
         label = repr(self.columns[index].name)
-        if field in _NULLS:
+        if field in self._nulls:
             return
         if kind.startswith("time"):
             if not (ISO if kind.startswith("timestamp") else CLOCK).fullmatch(field):
@@ -220,7 +236,7 @@ class TextTable:
         try:
             float(field.replace(",", ".") if self.dialect.decimal == "," else field)
         except ValueError:
-            remedy = "write a decimal point or give --decimal ," if "," in field else "fill it or cut the record"
+            remedy = "write a decimal point or give --decimal ," if "," in field else _remedy(field)
             self._refuse(f"expected a finite number in {label}, got {quoted(field)}; {remedy}", line)
         if kind == "int64" and not re.fullmatch(r"[+-]?\d+", field):
             self._refuse(
@@ -231,6 +247,10 @@ class TextTable:
         raise refusal(self.path, message, line=line)
 
 
+def _remedy(field: str) -> str:
+    return f"fill it, cut the record, or give --missing {field!r} if that means none"
+
+
 def _plain(column: Any) -> NDArray[Any]:
     """Return a column as int64, datetime64[ns] or float64 with NaN where a value is missing."""
     import pyarrow as pa
@@ -239,6 +259,19 @@ def _plain(column: Any) -> NDArray[Any]:
     if pa.types.is_temporal(column.type):
         ticks = column.combine_chunks().cast(pa.int64())
         return np.asarray(ticks.fill_null(np.iinfo(np.int64).min)).view("datetime64[ns]")
+    if pa.types.is_decimal(column.type):
+        return _from_decimal(column.combine_chunks())
     if column.null_count and pa.types.is_integer(column.type):
         column = pc.cast(column, pa.float64())
     return np.asarray(column.combine_chunks().to_numpy(zero_copy_only=False))
+
+
+def _from_decimal(column: Any) -> NDArray[Any]:
+    """Return decimals as numbers with 64 bits of mantissa, exact for nanoseconds of the epoch; else as float64."""
+    import pyarrow as pa
+
+    words = np.frombuffer(column.buffers()[1], np.int64)[2 * column.offset :][: 2 * len(column)].reshape(-1, 2)
+    fits = column.null_count == 0 and np.array_equal(words[:, 1], words[:, 0] >> 63)
+    if not fits:
+        return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False))
+    return words[:, 0].astype(np.longdouble) / np.longdouble(10**_DIGITS)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.turntable.realisation import gaussian_rate
+from testbed.models.turntable.realisation import SPLINE_COST, gaussian_rate
 from testbed.parts import Part
 from testbed.units import Frequency, Quantity
 
@@ -107,6 +107,10 @@ class PlatformPsd(Motion):
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         return gaussian_rate(self.density, self._band(), duration, rng)
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the spline."""
+        return SPLINE_COST
 
     def top_frequency(self) -> float:
         """Return the upper edge of the band [Hz]."""

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from testbed.models.motion import Motion, RateFunction
-from testbed.models.turntable.realisation import gaussian_rate
+from testbed.models.turntable.realisation import SPLINE_COST, gaussian_rate
 from testbed.units import Frequency, RatePsd
 
 if TYPE_CHECKING:
@@ -51,6 +51,10 @@ class Random(Motion):
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         return gaussian_rate(lambda freq: np.full_like(freq, self.psd), (self.low, self.high), duration, rng)
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the spline."""
+        return SPLINE_COST
 
     def top_frequency(self) -> float:
         """Return the upper edge of the band [Hz]."""

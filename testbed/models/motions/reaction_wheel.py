@@ -175,6 +175,10 @@ class ReactionWheel(Motion):
             return ()
         return tuple(harmonic.number * self.speed / (2.0 * np.pi) for harmonic in self.harmonics)
 
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the harmonics, each through all modes in a ramp."""
+        return len(self.harmonics) * (1 if self.stop_speed is None else 4 + 4 * len(self.modes))
+
     def top_frequency(self) -> float:
         """Return the highest harmonic at the highest speed [Hz]."""
         number = max(harmonic.number for harmonic in self.harmonics)

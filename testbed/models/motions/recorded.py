@@ -22,6 +22,7 @@ from testbed.logs.options import refusal
 from testbed.logs.plan import plan
 from testbed.logs.reader import read_plans
 from testbed.models.motion import Motion, RateFunction
+from testbed.models.turntable.realisation import SPLINE_COST
 from testbed.parts import Part
 
 if TYPE_CHECKING:
@@ -134,6 +135,10 @@ class Recorded(Motion):
             return result
 
         return value
+
+    def n_term(self) -> int:
+        """Return how many sines cost as much time as the spline."""
+        return SPLINE_COST
 
     def top_frequency(self) -> float:
         """Return the frequency [Hz] above which less than 1e-6 of the power of the rate lies."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import model_validator
-from scipy.interpolate import make_interp_spline
 
 from testbed.models.motion import ramp
+from testbed.models.turntable.realisation import grid, periodic_spline
 from testbed.parts import Part
 from testbed.units import Angle, AngularAcceleration, Duration, Frequency, Position, Quantity
 
@@ -25,8 +25,6 @@ Stream = Callable[..., np.random.Generator]
 LinearAcceleration = Annotated[float, Quantity("m/s^2", "1 mm/s^2")]
 AccelerationPsd = Annotated[float, Quantity("m^2/s^3", "1e-8 (m/s^2)^2/Hz", at_least=0.0, cycle_is_number=True)]
 AngularPsd = Annotated[float, Quantity("rad^2/s^3", "1e-8 (rad/s^2)^2/Hz", at_least=0.0, cycle_is_number=True)]
-
-_OVERSAMPLING = 16
 
 
 class FloorLine(Part):
@@ -215,17 +213,13 @@ def _sine(line: FloorLine) -> Callable[[FloatArray, int], FloatArray]:
 
 def _noise(band: FloorBand, duration: float, rng: np.random.Generator) -> Callable[[FloatArray, int], FloatArray]:
     """Return a periodic realisation, longer than the run, as a quintic spline over 16 points per period of `high`."""
-    # At least 50 lines lie in the band, so that the sum is close to Gaussian also in a short run.
-    period = max(1.05 * duration, 50.0 / (band.high - band.low))
-    n = int(np.ceil(_OVERSAMPLING * band.high * period))
+    period, n = grid((band.low, band.high), duration)
     k = np.arange(int(np.ceil(band.low * period)), int(np.floor(band.high * period)) + 1)
     # One line carries the two-sided power 2 S / P of the acceleration, 1 / (2 pi f)^4 of it in displacement.
     size = 0.5 * n * np.sqrt(2.0 * band.psd / period) / (2 * np.pi * k / period) ** 2
     lines = np.zeros(n // 2 + 1, dtype=complex)
     lines[k] = size * (rng.standard_normal(k.size) - 1j * rng.standard_normal(k.size))
-    grid = np.fft.irfft(lines, n)
-    t = np.arange(n + 1) * (period / n)
-    spline = make_interp_spline(t, np.append(grid, grid[0]), k=5, bc_type="periodic")
+    spline = periodic_spline(lines, n, period)
     derivatives = (spline, spline.derivative())
 
     def term(t: FloatArray, order: int) -> FloatArray:

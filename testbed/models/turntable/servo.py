@@ -132,6 +132,22 @@ def hold_matrices(inertia: float, drag: float, dt: float) -> tuple[FloatArray, F
     return step[:2, :2], step[:2, 2]
 
 
+def count_torque(parameters: TurntableParameters) -> float:
+    r"""Return what one count of the encoder asks of the motor through the loop in mode `digital` [N m], else 0.
+
+    .. math:: (k_p + k_v \alpha / T) \Delta
+
+    Parameters
+    ----------
+    parameters : TurntableParameters
+        Of the servo and its encoder.
+    """
+    if parameters.mode != "digital":
+        return 0.0
+    (kp, kv), digital = gains(parameters), parameters.digital
+    return (kp + kv * digital.filter_gain * digital.controller_rate) * digital.resolution
+
+
 def required_torque(parameters: TurntableParameters, command: CommandBlock, sample_rate_hz: float) -> FloatArray:
     r"""Return the motor torque that a motion needs at most in each step.
 
@@ -170,6 +186,6 @@ def required_torque(parameters: TurntableParameters, command: CommandBlock, samp
     else:
         motion *= 1.0 + sum(one.relative for one in digital.ripple)
         loop = kv * (0.5 / digital.controller_rate - half) * np.abs(acceleration)
-        loop += (kp + kv * digital.filter_gain * digital.controller_rate) * digital.resolution
+        loop += count_torque(parameters)
     torque: FloatArray = np.abs(motion) + loop + sum(harmonic.torque for harmonic in parameters.cogging)
     return torque

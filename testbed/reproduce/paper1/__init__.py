@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.judging.budget import signal_optima
-from testbed.metrics.errors import ErrorMetrics, floor_rmse
+from testbed.judging.bounds import Bounds
+from testbed.metrics.errors import ErrorMetrics
 from testbed.reproduce.paper1.defects import table_ii_defects
 from testbed.reproduce.paper1.runs import FILTERS, SIGNALS, FusionProtocol, errors, outputs, presets, truth
 from testbed.runs.atomic import write_text
@@ -131,9 +131,8 @@ def _bounds(rates: Mapping[str, FloatArray], protocol: FusionProtocol) -> dict[s
         judged = ErrorMetrics([sine.frequency for sine in SIGNALS[signal]])
         judged.add(sample_times(first, rate.size - first, BASE_RATE_HZ), rate[first:], rate[first:])
         lines.append(judged.truth_lines())
-    floor = floor_rmse([sensor.input_noise_psd for sensor in sensors.values()], BANDWIDTH_HZ)
-    clocks = {name: sensor.sample_rate for name, sensor in sensors.items()}
-    best = signal_optima(sensors, clocks, lines, coloured=True)
+    bounds = Bounds(sensors, {name: sensor.sample_rate for name, sensor in sensors.items()})
+    floor, (best, _) = bounds.floor(BANDWIDTH_HZ), bounds.settled(lines)
     # Both sensors are rational and see every frequency between them.
     assert floor is not None
     assert best is not None

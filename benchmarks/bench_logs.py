@@ -1,0 +1,130 @@
+"""Speed and memory of reading recordings: CPU seconds, and the largest resident size of the process.
+
+`python benchmarks/bench_logs.py` prints a row for each; `--long` adds a text of 1 GB, inspected in blocks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+N_BINARY, N_TEXT, FS = 6_000_000, 8_000_000, 1000.0
+
+
+def rates(n: int) -> np.ndarray:
+    return np.random.default_rng(1).standard_normal(n)
+
+
+def npy(path: Path) -> None:
+    with path.open("wb") as stream:
+        np.save(stream, np.stack([np.arange(N_BINARY) / FS, rates(N_BINARY)], axis=1))
+
+
+def parquet(path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet as pq
+
+    pq.write_table(pa.table({"t [s]": np.arange(N_BINARY) / FS, "w [deg/s]": rates(N_BINARY)}), path)
+
+
+def hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["t_s"] = np.arange(N_BINARY) / FS
+        file["w_dps"] = rates(N_BINARY)
+
+
+def mdf(path: Path) -> None:
+    import asammdf
+
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(rates(N_BINARY), np.arange(N_BINARY) / FS, name="w", unit="deg/s")])
+    file.save(path.with_suffix(".mf4"), overwrite=True)
+    path.with_suffix(".mf4").rename(path)
+
+
+def tdms(path: Path) -> None:
+    import nptdms
+
+    said = {"wf_increment": 1.0 / FS, "unit_string": "deg/s"}
+    with nptdms.TdmsWriter(str(path)) as file:
+        file.write_segment([nptdms.ChannelObject("bench", "w", rates(N_BINARY), properties=said)])
+
+
+def text(path: Path, n: int = N_TEXT) -> None:
+    block = 1_000_000
+    with path.open("w") as stream:
+        stream.write("t_us,w [deg/s]\n")
+        for start in range(0, n, block):
+            values = rates(block)
+            stream.write("".join(f"{(start + k) * 1000},{v:.5f}\n" for k, v in enumerate(values.tolist())))
+
+
+READ = """
+import resource, sys, time
+from testbed.logs.choice import select
+from testbed.logs.selection import Selection
+from pathlib import Path
+import pyarrow.csv, h5py
+begin = time.process_time()
+(channel,) = select(Path(sys.argv[1]), Selection(**eval(sys.argv[2])))
+print(channel.values.size, time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+def measure(name: str, write, **said: object) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log"
+        write(path)
+        size = path.stat().st_size / 1e6
+        words = [sys.executable, "-c", READ, str(path), repr(said)]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        n, seconds, peak = done.stdout.split()
+        print(
+            f"{name:10s} {int(n):>9d} samples {size:7.1f} MB {float(seconds):6.2f} CPU s {float(peak):7.0f} MB resident"
+        )
+
+
+def inspect_long() -> None:
+    """Inspect a text of 1 GB: the memory must not grow with it."""
+    with tempfile.TemporaryDirectory() as folder:
+        for n in (5_000_000, 55_000_000):
+            path = Path(folder) / "log.csv"
+            text(path, n)
+            begin = time.monotonic()
+            child = os.posix_spawn(
+                sys.executable, [sys.executable, "-m", "testbed", "log", "inspect", "--json", str(path)], os.environ
+            )
+            _, status, usage = os.wait4(child, 0)
+            size = path.stat().st_size / 1e6
+            spent = usage.ru_utime + usage.ru_stime
+            words = f"{spent:.1f} CPU s, {time.monotonic() - begin:.1f} s, {usage.ru_maxrss / 1024:.0f} MB resident"
+            print(f"inspect {size:.0f} MB: status {status}, {words}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--long", action="store_true")
+    wanted = parser.parse_args()
+    measure("npy", npy, column=["column 2"], unit="deg/s", time="column 1")
+    measure("parquet", parquet)
+    measure("hdf5", hdf5)
+    measure("mdf4", mdf, column=["w"])
+    measure("tdms", tdms)
+    measure("text", text)
+    if wanted.long:
+        inspect_long()
+    print(f"this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""What the commanded motion asks of table and sensors at its hardest, found in bounded time however long the run is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.errors import ScenarioError
+from testbed.models.turntable.servo import required_torque
+from testbed.signals import BLOCK
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from testbed.scenario.model import Scenario
+
+# Terms that are worked out, each a sine over a base step or as dear as one: about a second.
+_MOST_WORK = 24_000_000
+# What a base step costs besides its terms.
+_STEP = 3
+_LEAST_WINDOW = 256
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """The hardest moments of a commanded motion.
+
+    Parameters
+    ----------
+    rate : float
+        Largest commanded rate [rad/s].
+    torque : float
+        Largest torque that it asks of the motor [N m].
+    places : tuple of 3 int
+        Base steps of the largest rate, torque and third derivative of the rate.
+    played : int
+        Base steps that were looked at: all of them, or windows spread evenly over the run.
+    """
+
+    rate: float
+    torque: float
+    places: tuple[int, int, int]
+    played: int
+
+
+def command_peaks(scenario: Scenario) -> Peaks:
+    """Play the commanded motion without a plant, whole or in windows, and return its peaks.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose motion.
+
+    Raises
+    ------
+    ScenarioError
+        If a recorded motion cannot be read, or noise takes too many points.
+    RunError
+        If the motion of a plug-in fails.
+    """
+    motion, peaks, places, played = scenario.profile(), [0.0, -1.0, -1.0], [0, 0, 0], 0
+    terms = sum(part.n_term() for _, part in scenario.motion)
+    for start, n_time in windows(scenario.n_time, _STEP + terms):
+        command = motion.peek(n_time, start)
+        if not (np.isfinite(command.rate).all() and np.isfinite(command.rate_mid).all()):
+            msg = f"expected a finite rate, got one that is not, from t = {start / scenario.base_rate_hz:g} s on"
+            raise ScenarioError(msg)
+        torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
+        for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
+            if measure.size and float(np.max(measure)) > peaks[i]:
+                peaks[i], places[i] = float(np.max(measure)), start + int(np.argmax(measure))
+        played += n_time
+    return Peaks(peaks[0], max(peaks[1], 0.0), (places[0], places[1], places[2]), played)
+
+
+def windows(n_time: int, cost: int) -> Iterator[tuple[int, int]]:
+    """Yield start and length of the windows in which a run is played [base steps], from its first to its last step.
+
+    Parameters
+    ----------
+    n_time : int
+        Length of the run [base steps].
+    cost : int
+        Work per base step; if that of the run is within the cap, the windows follow one another.
+    """
+    most = max(_MOST_WORK // cost, _LEAST_WINDOW)
+    if n_time <= most:
+        yield from ((start, min(BLOCK, n_time - start)) for start in range(0, n_time, BLOCK))
+        return
+    length = min(max(most // 64, _LEAST_WINDOW), BLOCK)
+    number = max(most // length, 2)
+    yield from (((n_time - length) * i // (number - 1), length) for i in range(number))

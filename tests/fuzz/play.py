@@ -1,0 +1,111 @@
+"""Plays a case as `testbed check` would, and says what is wrong with the answer."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import resource
+import signal
+import time
+import traceback
+import warnings
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+
+from testbed.errors import MOST_QUOTED, ScenarioError
+
+MOST_SECONDS, MOST_MEMORY = 5.0, 1 << 30
+# Long enough to be no list of known names.
+_LONGEST_MESSAGE = 2000
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a case ended: accepted or refused, in how much time, and what is wrong with that."""
+
+    outcome: str
+    seconds: float
+    fault: str = ""
+
+
+def memory():
+    """Return the largest memory that this process ever had [byte]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+class TookTooLongError(BaseException):
+    """Not to be caught by what is tested."""
+
+
+@contextmanager
+def within(seconds):
+    def ring(_signal, _frame):
+        raise TookTooLongError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def check(path):
+    """Do what `testbed check` does."""
+    from testbed.cli.understood import doubts, print_scenario, scenario_document
+    from testbed.judging.table_facts import table_facts
+    from testbed.scenario.loader import load_scenario
+
+    scenario = load_scenario(path)
+    doubts(scenario)
+    facts = table_facts(scenario)
+    json.dumps(scenario_document(scenario, facts), allow_nan=False)
+    print_scenario(scenario, facts)
+
+
+def play(text, path, seconds=4 * MOST_SECONDS):
+    """Write a case and check it.
+
+    Parameters
+    ----------
+    text : str
+        The case.
+    path : Path
+        Where to.
+    seconds : float
+        After which it is given up [s].
+    """
+    path.write_text(text, encoding="utf-8", errors="surrogatepass", newline="")
+    begin, cpu, fault, outcome = time.monotonic(), time.process_time(), "", "accepted"
+    before = memory()
+    try:
+        with within(seconds), redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            check(path)
+    except ScenarioError as error:
+        outcome, fault = "refused", message_fault(error)
+    except TookTooLongError:
+        outcome, fault = "hung", "".join(traceback.format_exc().splitlines(keepends=True)[-8:])
+    except BaseException:  # noqa: BLE001 - whatever else comes out is what is looked for
+        outcome, fault = "raised", traceback.format_exc()
+    # Of this process: others may have the machine too.
+    spent = min(time.process_time() - cpu, time.monotonic() - begin)
+    if not fault and spent > MOST_SECONDS:
+        fault = f"took {spent:.1f} s"
+    if not fault and memory() - before > MOST_MEMORY:
+        fault = f"took {(memory() - before) >> 20} MB"
+    return Result(outcome, spent, fault)
+
+
+def message_fault(error):
+    """Return what is wrong with the findings: none, too long, or more of the input than is allowed."""
+    for problem in error.problems:
+        if not problem.message:
+            return "a finding without words"
+        if len(problem.message) > _LONGEST_MESSAGE:
+            return f"a message of {len(problem.message)} characters: {problem.message[:200]}"
+        if re.search(rf"(x|s|9|\[|\{{){{1}}\1{{{MOST_QUOTED},}}", problem.message):
+            return f"repeats more than {MOST_QUOTED} characters: {problem.message[:300]}"
+    return ""
