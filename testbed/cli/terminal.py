@@ -72,6 +72,8 @@ def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
         if names := [name for name, source in metrics.fusion.items() if source.start == start]:
             yield f"start: {', '.join(names)} {words}"
     for name, source in metrics.fusion.items():
+        if source.caution:
+            yield f"{name}: {source.caution}"
         if gated := {sensor: n for sensor, n in (source.gated or {}).items() if n}:
             yield f"{name}: struck out {', '.join(f'{n} readings of {sensor}' for sensor, n in gated.items())}"
 

@@ -130,6 +130,8 @@ class BlockFilter:
     """It divides the band between two sensors, and refuses one alone or three."""
     spike_leaves: ClassVar[float] = 1.1
     """Error after a single bad reading, 0.64 s later, over that of a run without it: at most."""
+    caution: ClassVar[str] = ""
+    """Where it does not hold; printed beside its results."""
     start_leaves: ClassVar[tuple[float, float] | None] = None
     """Rms error 10 s after a start in mid-motion, and inside 6 deg/s [rad/s]: at most; None promises nothing."""
     fault_leaves: ClassVar[tuple[float, float]] = (math.radians(1.5), math.radians(0.1))

@@ -93,6 +93,7 @@ class Judge:
                 "belief": declared(spec.belief),
                 "start": getattr(spec.parameters, "start", None),
                 "gated": self._gated.get(name),
+                "caution": getattr(spec.factory, "caution", None) or None,
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 **floors,

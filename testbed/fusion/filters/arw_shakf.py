@@ -112,6 +112,10 @@ class ArwShakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ArwShakfParameters
+    caution = (
+        "its bands of N_k see amplitude times frequency and were calibrated at 1 deg/s: at 10 deg/s and 10 Hz it errs "
+        "by 0.02 deg/s and claims 0.003"
+    )
     # A band sets R of the gyro 10 to 100 times above the true one: innovations far smaller than claimed, the estimate
     # is hardly touched.
     departs: ClassVar[Mapping[str, tuple[float, float]]] = {"nees": (0.5, 1.7), "nis_mems_gyro": (0.01, 0.3)}
