@@ -91,6 +91,7 @@ class Delayed(Sensor):
         raise NotImplementedError
 
 
+@pytest.mark.slow
 def test_what_no_few_poles_meet_has_no_exact_belief():
     assert believed(Delayed()) is None
     with pytest.raises(ValueError, match="few poles"):
