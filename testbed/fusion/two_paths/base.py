@@ -123,7 +123,7 @@ class TwoPaths(BlockFilter):
             return lag + noise_variance(paths, self.model, self._slow, self._fast)
 
         self.bandwidth_hz = parameters.bandwidth or _best_bandwidth(candidate, self.model.sample_rate_hz)
-        self._settled = candidate(self.bandwidth_hz) + slow_variance(slow, fast, order, crossover)
+        self._settled = candidate(self.bandwidth_hz)
         band = band_end(slow, fast, 2.0 * math.pi * self.bandwidth_hz)
         T = 1.0 / self.model.sample_rate_hz
         slow_rate_hz = self.model.sample_rate_hz / self.model.strides[self._slow]
@@ -149,6 +149,9 @@ class TwoPaths(BlockFilter):
                 parameters.rest_rate if rest else math.nan,
                 math.exp(-slowest * T),
                 _drift(fast, 1e-3 * self.crossover_hz),
+                parameters.rest_rate * fast.numerator[-1] / fast.denominator[-1] if rest else 0.0,
+                math.sqrt(_drift(fast, 1e-3 * self.crossover_hz)) / fast.output_noise,
+                slow_variance(slow, fast, order, crossover),
             ]
         )
         self._memory = np.zeros(MEMORY_ENTRIES)

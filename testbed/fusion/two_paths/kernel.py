@@ -31,8 +31,11 @@ MEMORY_ENTRIES = 12
 # gain over the crossover [-]; density of the slow path's noise [rad^2/s]; variance of the slow path alone
 # [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor
 # counts as missing; the rate of rest, NaN if the start is unknown [rad/s]; what is left after a step of what
-# the slow path got wrong at its start [-]; drift of the fast path by itself [rad^2/s^3].
-PERIOD, CROSSOVER, SLOPE_GAIN, GAIN, DENSITY, ALONE, TURN, POWER, PATIENCE, REST, UPRIGHT, DRIFT = range(12)
+# the slow path got wrong at its start [-].
+PERIOD, CROSSOVER, SLOPE_GAIN, GAIN, DENSITY, ALONE, TURN, POWER, PATIENCE, REST, UPRIGHT = range(11)
+# The fast path's drift by itself [rad^2/s^3], the fast reading at rest [rad/s], and the share of a change that the fast
+# sensor forgets in a second [1/s]; variance that slow noise leaves behind the settled loop [rad^2/s^2].
+DRIFT, REST_READING, FORGOTTEN, SLOW = range(11, 15)
 
 
 @njit(cache=True, error_model="numpy")
@@ -79,6 +82,12 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
     for k in range(fast.size):
         out[SLOW_INNOVATION, k] = np.nan
         seen = np.isfinite(fast[k])
+        if seen and memory[FAST_STARTED] == 0.0 and not np.isnan(setting[REST]):
+            # What is known of a rest is not the first reading with its noise.
+            memory[FAST_STARTED], memory[READING] = 1.0, setting[REST_READING]
+            for i in range(x_fast.size):
+                x_fast[i] = still[i] * memory[READING]
+            memory[ADDED] = setting[REST] - output(x_fast, C, D, memory[READING])
         if memory[FAST_STARTED] > 0.0:
             z = fast[k] if seen else memory[READING]
             advance(x_fast, moved, Phi, Gamma, ramp, memory[READING], z - memory[READING])
@@ -87,8 +96,6 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
             memory[FAST_STARTED], memory[READING] = 1.0, fast[k]
             for i in range(x_fast.size):
                 x_fast[i] = still[i] * fast[k]
-            if not np.isnan(setting[REST]):
-                memory[ADDED] = setting[REST] - output(x_fast, C, D, fast[k])
         if memory[SLOW_STARTED] > 0.0:
             advance(x_slow, moved_slow, Phi_slow, Gamma_slow, Gamma_slow, memory[HELD], 0.0)
         memory[SLOW_WAIT] += 1.0
@@ -101,10 +108,13 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
         carried = output(x_fast, C, D, memory[READING])
         started = memory[FAST_STARTED] + memory[SLOW_STARTED] > 0.0
         if seen:
+            # What the fast sensor has forgotten of the change that it did not show.
+            lost = min(0.5 * setting[FORGOTTEN] * memory[BLIND], 1.0)
+            memory[VARIANCE] += lost * lost * departure(setting, memory[BLIND])
             memory[BLIND] = 0.0
         elif started:
             memory[BLIND] += T
-            memory[VARIANCE] += departure(setting, memory[BLIND]) - departure(setting, memory[BLIND] - T)
+        gone = departure(setting, memory[BLIND])
         if memory[SLOW_STARTED] > 0.0 and memory[SLOW_WAIT] < setting[PATIENCE]:
             # The slow path alone is never worse than this, and w = p / N^2 follows w' = w_c^2 - w^2.
             w = min(memory[VARIANCE], setting[ALONE]) / setting[DENSITY]
@@ -118,9 +128,10 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
                 memory[LEANING] += share * (memory[LEAN] - memory[LEANING])
                 memory[SLOPE] += T * setting[SLOPE_GAIN] * e
                 memory[VARIANCE] = setting[DENSITY] * crossover * (w + crossover * turn) / (crossover + w * turn)
-            elif memory[FAST_STARTED] == 0.0 or memory[VARIANCE] >= setting[ALONE]:
+            elif memory[FAST_STARTED] == 0.0 or memory[VARIANCE] + gone >= setting[ALONE]:
                 memory[ADDED] += e
                 memory[LEANING], memory[VARIANCE] = memory[LEAN], setting[ALONE]
+                gone = 0.0
         else:
             memory[ADDED] += T * memory[SLOPE]
             if started:
@@ -133,6 +144,7 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
             rate = 0.0 if np.isnan(setting[REST]) else setting[REST]
         out[RATE, k] = rate
         # Before the loop has settled its part is more, after a known rest less, but the fast path's stays.
-        loop = max(settled[step] + memory[VARIANCE] - final, 0.1 * settled[step])
+        loop = max(settled[step] + memory[VARIANCE] - final, 0.1 * settled[step]) + gone
+        loop += setting[SLOW] * min(memory[VARIANCE] / final, 1.0)
         out[STD, k] = np.sqrt(loop + memory[LEANING] * memory[LEANING])
         memory[STEP] = (step + 1) % settled.size

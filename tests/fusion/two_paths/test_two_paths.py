@@ -179,7 +179,7 @@ def test_noise_variance_of_the_plain_pair_is_the_closed_form(cls: Any, factor: f
 def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
     """Without the gyro the variance grows by w_c^2 n^2 per second, and a sine is still followed."""
     t = np.arange(40_000) / 20_000.0
-    belief = load_belief("identified")
+    belief = white(load_belief("identified"))
     response = belief["mhd_ars"].realisation().response(np.array([10.0]))[0]
     z = {"mhd_ars": (DEG * response * np.exp(20j * np.pi * t)).imag, "mems_gyro": np.full(4000, np.nan)}
     block = cls(belief, RATES, TwoPathParameters(start="rest")).process(z)
