@@ -66,8 +66,10 @@ class Plan:
         Whether the stamps are to be used, or only compared with the rate.
     largest : float, optional
         Range of the sensor [SI].
-    notes : tuple of str
+    assumed : tuple of str
         What was taken for granted.
+    contradictions : tuple of str
+        What the file says otherwise.
     """
 
     name: str
@@ -86,7 +88,8 @@ class Plan:
     offset_ns: int
     time_said: bool
     largest: float | None
-    notes: tuple[str, ...]
+    assumed: tuple[str, ...]
+    contradictions: tuple[str, ...]
 
 
 def option_keys(field: str) -> str:
@@ -206,7 +209,7 @@ def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys)
         If a column is not there, or a unit or kind does not fit.
     """
     place = find_column(table, channel.column, keys("column"), channel.topic)
-    unit, quantity, factor, zero, notes = _measured(channel, table, place)
+    unit, quantity, factor, zero, assumed = _measured(channel, table, place)
     if channel.kind and quantity and quantity != {"rate": "rate"}.get(channel.kind, "angle"):
         good = "deg/s" if channel.kind == "rate" else "arcsec"
         raise refusal(table.path, f"kind {channel.kind} expects a unit such as {good}, got {unit!r}", keys("kind"))
@@ -230,7 +233,8 @@ def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys)
         offset_ns=0 if channel.time is None else round(channel.time.offset / NANO) + channel.time.epoch_ns,
         time_said=said,
         largest=largest,
-        notes=(*notes, *time_notes),
+        assumed=(*assumed, *time_notes),
+        contradictions=_other_unit(channel, labels(table)[place]),
     )
 
 
@@ -240,21 +244,26 @@ def _measured(channel: ChannelMap, table: Table, place: int) -> tuple[str, str, 
     if channel.scale is not None:
         value, quantity = measure(channel.scale)
         return channel.scale, quantity, value, 0.0, []
-    unit, notes = channel.unit or label.unit, []
+    unit = channel.unit or label.unit
     if channel.unit is None and not unit and (said := _preamble_scale(table, label.name)):
         unit, value = said, measure(said)[0]
         return unit, "rate", value, 0.0, [f"{label.name}: {unit} a count, as the preamble says"]
-    if channel.unit and label.unit and channel.unit != label.unit and quantity_of(label.unit):
-        given, written = (_factor(text) for text in (channel.unit, label.unit))
-        if given != written:
-            notes.append(f"{label.name}: the file says {label.unit}, {channel.unit} was asked for and is used")
     quantity = quantity_of(unit)
     if not quantity:
-        return unit if not _COUNTS.fullmatch(unit) else "", "", 1.0, 0.0, notes
+        return unit if not _COUNTS.fullmatch(unit) else "", "", 1.0, 0.0, []
     if quantity == "temperature":
         zero = units.parse(f"0 {unit}", "K")
-        return unit, quantity, units.parse(f"1 {unit}", "K") - zero, zero, notes
-    return unit, quantity, _factor(unit), 0.0, notes
+        return unit, quantity, units.parse(f"1 {unit}", "K") - zero, zero, []
+    return unit, quantity, _factor(unit), 0.0, []
+
+
+def _other_unit(channel: ChannelMap, label: Label) -> tuple[str, ...]:
+    """Return that the file gives a column another unit than the one asked for, if it does."""
+    if not (channel.unit and quantity_of(channel.unit) and quantity_of(label.unit)):
+        return ()
+    if quantity_of(channel.unit) == quantity_of(label.unit) and _factor(channel.unit) == _factor(label.unit):
+        return ()
+    return (f"contradiction: {label.name} is in {label.unit} by the file; {channel.unit} was asked for and is used",)
 
 
 def _factor(unit: str) -> float:

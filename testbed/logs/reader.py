@@ -195,7 +195,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
         raise refusal(table.path, message, line=table.line(row))
     stamps, clock = timed if timed else (None, None)
-    notes = [*one.notes, *table.notes]
+    notes = [*one.contradictions, *table.notes]
     if clock is not None and not one.time_said:
         assert one.rate_hz is not None
         notes += _contradiction(one, clock)
@@ -216,6 +216,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         stamps_ns=None if stamps is None else stamps + one.offset_ns,
         clock=clock,
         rate_hz=rate_hz,
+        assumed=one.assumed,
         notes=tuple(notes),
         table=table,
         largest=one.largest,
