@@ -24,7 +24,7 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
     template : str
         File in `testbed/pages/templates`.
     figures : mapping of str to Figure
-        Reach the template as `figures`, SVG by name.
+        Reach the template as `figures`, SVG by name, in the order in which it shows them: `figure_number` counts them.
     **values : Any
         What else the template shows or calls.
     """
@@ -37,7 +37,7 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
     )
     environment.filters |= {"significant": significant, "bounded": bounded, "fixed": fixed, "plain": plain}
     # Globals, so that the macros of a template see them too.
-    environment.globals |= values
+    environment.globals |= {**values, "figure_number": {name: number for number, name in enumerate(figures, 1)}}
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
     drawn = {name: Markup(svg_text(figure, name)) for name, figure in figures.items()}
     return environment.get_template(template).render(figures=drawn)

@@ -64,11 +64,10 @@ def run_figures(run: RunRecord) -> dict[str, Figure]:
 
 
 def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
-    figures, (unit, scale) = _figures(metrics, digest), error_unit(metrics)
+    unit, scale = error_unit(metrics)
     return render(
         "report.html.j2",
-        figures,
-        figure_number={name: number for number, name in enumerate(figures, 1)},
+        _figures(metrics, digest),
         unit=unit,
         scale=scale,
         ratios=RATIOS,

@@ -24,7 +24,7 @@ _LOWEST_HZ, _POINTS = 1e-2, 121
 _FIT_MISFIT = 1e-3
 # (real poles, pairs) in the order in which they are tried. A pair may become two real poles, and its search ends in
 # fewer local minima than one for two real poles does.
-_FORMS = tuple((n % 2, n // 2) for n in range(1, 8))
+_FORMS = tuple((n % 2, n // 2) for n in range(1, 9))
 # The noise is fitted from here up [Hz]: what rises below (1/f) is not in it.
 _WHITE_FROM_HZ = 1.0
 # What a belief and a sensor call by the same name.

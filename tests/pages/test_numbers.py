@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from testbed.pages.numbers import bounded, decimals_for
@@ -28,3 +30,12 @@ def test_the_digits_of_a_number_follow_its_interval(value, half, text):
 )
 def test_the_first_digit_of_the_half_width_is_the_last_shown_and_two_where_it_is_a_one(half, decimals):
     assert decimals_for(half) == decimals
+
+
+def test_no_template_types_the_number_of_a_figure():
+    from pathlib import Path
+
+    import testbed.pages
+
+    templates = (Path(testbed.pages.__file__).parent / "templates").glob("*.j2")
+    assert [path.name for path in templates if re.search(r"Figure \d", path.read_text(encoding="utf-8"))] == []

@@ -65,6 +65,14 @@ def test_the_exact_belief_is_the_simulators_own_response_and_noise(preset):
     np.testing.assert_allclose(density, sensor.input_noise_psd(freq[band]), rtol=0.1)
 
 
+@pytest.mark.slow
+def test_a_delay_of_two_samples_is_believed_by_eight_poles():
+    """0.1 ms is a whole turn of phase at half of 20 kHz."""
+    late = load_preset("sx300").model_copy(update={"delay": 1e-4})
+    freq = np.logspace(-2, 4, 77)
+    np.testing.assert_allclose(exact_belief(late).realisation().response(freq), late.response(freq), rtol=2e-3)
+
+
 class Delayed(Sensor):
     """A sensor that is late by tens of its samples: no few poles do that."""
 
@@ -83,6 +91,7 @@ class Delayed(Sensor):
         raise NotImplementedError
 
 
+@pytest.mark.slow
 def test_what_no_few_poles_meet_has_no_exact_belief():
     assert believed(Delayed()) is None
     with pytest.raises(ValueError, match="few poles"):
