@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline crash changes readme pictures clean
+.PHONY: run view test lint bench baseline crash changes readme pictures clean fuzz
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -35,6 +35,10 @@ lint: .venv/installed-test
 
 test: lint
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
+
+# 100,000 hostile inputs on two workers, in half an hour; what goes wrong is in runs/fuzz.
+fuzz: .venv/installed-test
+	$(BIN)/python -m tests.fuzz --cases 100000 --workers 2
 
 bench: .venv/installed-test
 	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done

@@ -32,6 +32,7 @@ class Blend(BlockFilter):
     """
 
     Parameters, needs_both = BlendParameters, True
+    fault_leaves = np.radians(1.5), np.radians(0.3)
 
     def __init__(self, belief, sample_rate_hz, parameters):
         super().__init__(belief, sample_rate_hz, parameters)

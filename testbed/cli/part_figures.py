@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
-from testbed.cli.console import terminal
+from testbed.cli.console import ruled, terminal
 from testbed.parts import preset, preset_names
 from testbed.sensors import load_preset
 from testbed.sensors.data_sheet import ALLAN_FLOOR
@@ -63,7 +62,8 @@ def _round(value: float) -> float:
 
 def print_part_figures(parts: Mapping[str, Mapping[str, Any]]) -> None:
     """Print one line for each shipped instrument."""
-    table = Table("part", *_COLUMNS.values())
+    table = ruled("part", *_COLUMNS.values())
+    table.columns[0].no_wrap = True
     for column in table.columns[2:-1]:
         column.justify = "right"
     for name, figures in parts.items():

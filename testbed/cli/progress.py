@@ -21,10 +21,39 @@ def progress(name: str, duration: float) -> Iterator[Callable[[float], None]]:
     """Show progress on standard error: a bar with rate and remaining time, or plain lines without a terminal."""
     if sys.stderr.isatty():
         with _bar() as bar:
-            task = bar.add_task(name, total=duration, speed="")
+            task = bar.add_task(name, total=duration, speed="compiling")
             yield _advance(bar, task)
     else:
         yield _plain(name, duration)
+
+
+class Pace:
+    """How fast a run is after its first block: that one loads libraries and compiles, which says nothing of the rest.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds of any origin.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._first: tuple[float, float] | None = None
+
+    def note(self, done: float) -> float | None:
+        """Return simulated seconds per second, None at the first call.
+
+        Parameters
+        ----------
+        done : float
+            Simulated time [s].
+        """
+        now = self._clock()
+        if self._first is None:
+            self._first = now, done
+            return None
+        began, before = self._first
+        return (done - before) / max(now - began, 1e-9)
 
 
 def _bar() -> Progress:
@@ -33,33 +62,38 @@ def _bar() -> Progress:
         BarColumn(),
         TaskProgressColumn(),
         TextColumn("{task.fields[speed]}"),
+        # It, too, counts from the first block on.
         TimeRemainingColumn(),
     )
     return Progress(*columns, console=Console(stderr=True))
 
 
 def _advance(bar: Progress, task: TaskID) -> Callable[[float], None]:
-    begin = time.monotonic()
+    pace = Pace(time.monotonic)
 
     def tick(done: float) -> None:
-        bar.update(task, completed=done, speed=f"{done / max(time.monotonic() - begin, 1e-9):.1f} x real time")
+        speed = pace.note(done)
+        bar.update(task, completed=done, speed="" if speed is None else f"{speed:.1f} x real time")
 
     return tick
 
 
 def _plain(name: str, duration: float) -> Callable[[float], None]:
-    begin = last = time.monotonic()
+    pace, last = Pace(time.monotonic), -_PLAIN_EVERY
 
     def tick(done: float) -> None:
         nonlocal last
-        now = time.monotonic()
-        if now - last >= _PLAIN_EVERY or done >= duration:
-            speed = done / max(now - begin, 1e-9)
-            line = (
-                f"{name}: {done:.0f} of {duration:g} s, {speed:.1f} x real time, "
-                f"{(duration - done) / speed:.0f} s remaining"
-            )
-            print(line, file=sys.stderr, flush=True)  # noqa: T201 - this is the terminal
-            last = now
+        speed, now = pace.note(done), time.monotonic()
+        if done < duration and (speed is None or now - last < _PLAIN_EVERY):
+            return
+        words = [f"{name}: {done:.0f} of {duration:g} s"]
+        words += [] if speed is None else [f"{speed:.1f} x real time"]
+        words.append("writing recording and report" if done >= duration else _remaining(duration - done, speed))
+        print(", ".join(words), file=sys.stderr, flush=True)  # noqa: T201 - this is the terminal
+        last = now
 
     return tick
+
+
+def _remaining(simulated: float, speed: float | None) -> str:
+    return "" if not speed else f"{simulated / speed:.0f} s of simulation remaining"

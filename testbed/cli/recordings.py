@@ -52,7 +52,7 @@ def print_reports(table: Table, reports: Sequence[Report], proposed: Proposal) -
     out.print(_grid(reports, max(0, min(_WIDTH, room)) if room >= _LEAST else 0))
     for name, clock in _clocks(reports).items():
         out.print(f"time {name}: {_time(clock)}", soft_wrap=True)
-    lines = [note for report in reports for note in report.plan.notes]
+    lines = [f"taken for granted: {text}" for report in reports for text in report.plan.assumed]
     lines += [f"finding: {finding.message}" for report in reports for finding in report.findings]
     lines += [*table.notes, *(f"to be said: {text}" for text in proposed.open)]
     for line in dict.fromkeys(lines):

@@ -34,7 +34,9 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     longest = max(map(len, metrics.sources), default=0)
     width = _TABLE_WIDTH + longest + _LINE_WIDTH * len(lines)
     shown = lines if len(lines) <= 4 and console.width >= width else []
-    headings = ("", *HEADINGS, *(f"{line:g} Hz gain, phase, x opt." for line in shown))
+    optimum = any(line.optimum_deg_s for source in metrics.fusion.values() for line in source.lines or [])
+    what = "gain, phase, x opt." if optimum else "gain, phase"
+    headings = ("", *HEADINGS, *(f"{line:g} Hz {what}" for line in shown))
     rows = [
         [
             [f"{kind}/{name}", *error_cells(source, unit[1]), *_line_cells(source, shown)]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.compensation import training
+from testbed.compensation.document import FORMAT, VERSION, ModelDocument, seal_of, sealed
 from testbed.compensation.features import Features, Scaling
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.polynomial import Polynomial
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
 
     Fit = Callable[[training.TrainingRows, int], tuple[Lssvm | Polynomial, float]]
 
-_FORMAT, _VERSION = "testbed drift model", 1
 _MACHINES: dict[str, type[Lssvm | Polynomial]] = {"lssvm": Lssvm, "polynomial": Polynomial}
+# A drift beyond it is that of no gyro: 5.7 deg/s.
+MOST_DRIFT = 0.1
 # What each method is: the kind of machine, how it is fitted, and the features unless told otherwise.
 METHODS: dict[str, tuple[str, Fit, Features]] = {
     "gradient": ("polynomial", training.fit_coloured, Features()),
@@ -109,8 +111,8 @@ class DriftModel:
         return self.start(record.sample_rate_hz).process(record.rate, record.temperature)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain lists and numbers for JSON, which keeps every bit."""
-        return {"format": _FORMAT, "version": _VERSION, **_plain(asdict(self))}
+        """Return the model as plain lists and numbers for JSON, which keeps every bit; with its own digest."""
+        return sealed({"format": FORMAT, "version": VERSION, **_plain(asdict(self))})
 
     @classmethod
     def from_dict(cls, document: dict[str, Any]) -> DriftModel:
@@ -124,29 +126,25 @@ class DriftModel:
         Raises
         ------
         ValueError
-            If it is no drift model, of another version, or incomplete.
+            If it is no drift model of this version: every field that is missing, unknown, of another type or out of its
+            range; or if its digest is another, so that it is not as it was written.
         """
-        found = (document.get("format"), document.get("version"))
-        if found != (_FORMAT, _VERSION):
-            msg = f"drift model: expected format {_FORMAT!r} version {_VERSION}, got {found[0]!r} version {found[1]!r}"
+        found = ModelDocument.model_validate(document)
+        if seal_of(document) != found.sha256:
+            msg = "drift model: sha256: expected the digest of the rest of the file, got another: it was changed since"
             raise ValueError(msg)
-        try:
-            method = document["method"]
-            features: dict[str, Any] = {
-                key: tuple(v) if isinstance(v, list) else v for key, v in document["features"].items()
-            }
-            return cls(
-                method,
-                float(document["sample_rate_hz"]),
-                float(document["mean_rate"]),
-                float(document["blocked_error"]),
-                Features(**features),
-                Scaling(**_arrays(document["scaling"])),
-                _MACHINES[METHODS[method][0]](**_arrays(document["machine"])),
-            )
-        except (KeyError, TypeError) as error:
-            msg = f"drift model: expected every field of version {_VERSION}, got {type(error).__name__}: {error}"
-            raise ValueError(msg) from error
+        features: dict[str, Any] = {
+            key: tuple(item) if isinstance(item, list) else item for key, item in found.features.model_dump().items()
+        }
+        return cls(
+            found.method,
+            found.sample_rate_hz,
+            found.mean_rate,
+            found.blocked_error,
+            Features(**features),
+            Scaling(**_arrays(found.scaling.model_dump())),
+            _MACHINES[METHODS[found.method][0]](**_arrays(found.machine.model_dump())),
+        )
 
 
 class CompensatorStage:
@@ -176,7 +174,8 @@ class CompensatorStage:
         Raises
         ------
         ValueError
-            If the lengths differ or a reading is not finite; the stage has then not moved.
+            If the lengths differ or a reading is not finite; the stage has then not moved. If the drift is none that
+            a gyro has.
         """
         readings, kelvin = checked("rate", rate), checked("temperature", temperature)
         if readings.size != kelvin.size:
@@ -184,6 +183,9 @@ class CompensatorStage:
             raise ValueError(msg)
         Z = self._model.scaling.apply(self._features.process(kelvin))
         drift = self._model.machine.predict(Z)
+        if not np.all(np.abs(drift) <= MOST_DRIFT):
+            msg = f"expected a drift of at most {MOST_DRIFT:g} rad/s, got more: the readings are far from trained ones"
+            raise ValueError(msg)
         return CompensatedBlock(readings - drift, drift, self._model.scaling.extrapolated(Z))
 
 

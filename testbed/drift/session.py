@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from testbed.compensation import PAPER, paper3
+from testbed.compensation.document import ModelDocument, sealed
 from testbed.compensation.model_only import METHODS, DriftModel, train
+from testbed.document import findings
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.records import ThermalRecord, check_options, read_thermal
-from testbed.errors import Problem, ScenarioError, UnknownNameError
+from testbed.errors import Problem, ScenarioError, UnknownNameError, shortened
+from testbed.inputs.files import read_bytes
 from testbed.runs.atomic import write_text
 from testbed.runs.folder import failing_as_run_error
 from testbed.units import DEG_H
@@ -28,6 +33,8 @@ if TYPE_CHECKING:
 
 # A rate taken for a temperature moves by less, and so does an oven that was not switched on.
 LEAST_SPAN = 1.0  # K
+_MOST_BYTES = 1 << 22
+_MOST_FINDINGS = 100
 
 
 def train_model(
@@ -73,7 +80,7 @@ def train_model(
         model = train([cycle.record for cycle in cycles], method=method)
     except ValueError as error:
         raise ScenarioError([Problem(str(error), file=", ".join(map(str, sources)))]) from error
-    document = {**model.to_dict(), "trained_on": {cycle.fingerprint: cycle.name for cycle in cycles}}
+    document = sealed({**model.to_dict(), "trained_on": {cycle.fingerprint: cycle.name[:300] for cycle in cycles}})
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, json.dumps(document, allow_nan=False) + "\n")
@@ -117,14 +124,44 @@ def read_model(path: Path) -> DriftModel:
 
 def _read_document(path: Path) -> tuple[DriftModel, dict[str, str]]:
     """Return a model, and the names of the cycles that it was trained on by their fingerprints."""
+    document = _read_json(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        model = DriftModel.from_dict(document if isinstance(document, dict) else {})
-        return model, dict(document.get("trained_on", {}))
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"expected a model that `testbed compensate train` wrote: {reason}"
-        raise ScenarioError([Problem(msg, file=str(path))]) from error
+        model = DriftModel.from_dict(document)
+    except ValidationError as error:
+        wrong = [
+            Problem(message, ".".join(map(str, key)), str(path))
+            for key, message in islice(findings(error, ModelDocument, document), _MOST_FINDINGS)
+        ]
+        raise ScenarioError(wrong) from error
+    except ValueError as error:
+        raise _no_model(path, str(error)) from error
+    if not document.get("trained_on"):
+        raise _no_model(path, "trained_on: expected the digests of the cycles that it was trained on, got none")
+    return model, dict(document["trained_on"])
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    content = read_bytes(path, _MOST_BYTES, "a drift model")
+    try:
+        document = json.loads(content.decode("utf-8"), object_pairs_hook=_unrepeated)
+    except (ValueError, RecursionError) as error:
+        raise _no_model(path, f"not JSON: {shortened(str(error))}") from error
+    if not isinstance(document, dict):
+        raise _no_model(path, "expected a mapping")
+    return document
+
+
+def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        msg = "a key is repeated"
+        raise ValueError(msg)
+    return found
+
+
+def _no_model(path: Path, reason: str) -> ScenarioError:
+    msg = f"expected a model that `testbed compensate train` wrote: {reason}"
+    return ScenarioError([Problem(msg, file=str(path))])
 
 
 def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -158,7 +195,10 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     _check_file(out)
     model, thermal = read_model(path), read_thermal(source, columns)
     tell(f"record: {thermal}")
-    block = model.apply(thermal.record)
+    try:
+        block = model.apply(thermal.record)
+    except ValueError as error:
+        raise ScenarioError([Problem(str(error), file=str(source))]) from error
     t = np.arange(block.rate.size) / thermal.record.sample_rate_hz
     rows = zip(t, block.rate / DEG_H, block.drift / DEG_H, block.extrapolated, strict=True)
     lines = [f"{time:.9g},{rate:.9g},{drift:.9g},{outside:d}" for time, rate, drift, outside in rows]

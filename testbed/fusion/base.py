@@ -132,8 +132,8 @@ class BlockFilter:
     """Error after a single bad reading, 0.64 s later, over that of a run without it: at most."""
     start_leaves: ClassVar[tuple[float, float] | None] = None
     """Rms error 10 s after a start in mid-motion, and inside 6 deg/s [rad/s]: at most; None promises nothing."""
-    fault_leaves: ClassVar[float] = math.radians(1.5)
-    """Error while a sensor is lost or lies for a second of 3 Hz, 1 deg/s [rad/s]: at most."""
+    fault_leaves: ClassVar[tuple[float, float]] = (math.radians(1.5), math.radians(0.1))
+    """Error while a sensor is lost or lies for a second of 3 Hz, 1 deg/s, and rms 3 s later [rad/s]: at most."""
     blames_the_other: ClassVar[str] = ""
     """Why a sensor at its rail spoils the trust in the other one, if it does."""
     departs: ClassVar[Mapping[str, tuple[float, float]]] = {}

@@ -102,7 +102,7 @@ def as_record(channel: LogChannel, name: str) -> Record:
         If its samples are not even.
     """
     rate = channel.rate()
-    content = f"{channel.label} of {channel.table.path}"
+    content = f"{channel.label} of {channel.table.path} ({'; '.join([channel.table.format, *channel.assumed])})"
     # The rounding of increments and angles is no noise of its own in each sample of the rate.
     word = word_of(channel) if channel.kind == "rate" else 0.0
     return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)

@@ -44,8 +44,10 @@ class LogChannel:
         What they say.
     rate_hz : float
         Sample rate [Hz]: what was said, or what the stamps say.
+    assumed : tuple of str
+        What was taken for granted.
     notes : tuple of str
-        What was taken for granted, and what contradicts it.
+        What contradicts what was said, and what was left out.
     table : Table
         The file.
     largest : float, optional
@@ -61,6 +63,7 @@ class LogChannel:
     stamps_ns: NDArray[np.int64] | None
     clock: TimeBase | None
     rate_hz: float
+    assumed: tuple[str, ...]
     notes: tuple[str, ...]
     table: Table
     largest: float | None = None

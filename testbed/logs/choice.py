@@ -10,7 +10,7 @@ from testbed.errors import Problem, ScenarioError, UnknownNameError
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap, load_map
 from testbed.logs.options import quantity, refusal
-from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan
+from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan, time_columns
 from testbed.logs.reader import is_map, read_map, read_plans
 
 if TYPE_CHECKING:
@@ -47,7 +47,12 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
         return _mapped(path, wanted)
     table = open_table(path, text)
     rate_hz = quantity(wanted.rate, "Hz", "100 Hz", "--rate") if wanted.rate else None
-    time = time_map(wanted.time, wanted.time_unit, None if wanted.time else rate_hz)
+    clock = wanted.time
+    if clock is None and wanted.time_unit and rate_hz is None:
+        # The unit alone was said: of the column that is the time by its name.
+        found = time_columns(table, table.columns[0].group)
+        clock = str(found[0] + 1) if len(found) == 1 else None
+    time = time_map(clock, wanted.time_unit, None if wanted.time else rate_hz)
     columns = wanted.column or _rotations(table, wanted)
     maps = [channel_map(column=c, unit=wanted.unit, scale=wanted.scale, kind=wanted.kind, time=time) for c in columns]
     plans = [plan(one.column if wanted.column else _name(table, one), one, table) for one in maps]
@@ -102,6 +107,8 @@ def _rotations(table: Table, wanted: Selection) -> list[str]:
         from testbed.logs.plan import find_column
 
         rest = [i for i in rest if i != find_column(table, wanted.time, "--time")]
+    # A column without a name beside others is the number of the row.
+    rest = [i for i in rest if table.columns[i].name] or rest
     named = [i for i in rest if measured_quantity(table, i) in ROTATIONS]
     # With increments and rates side by side, the rates are meant unless the kind is said.
     rates = [i for i in named if (measured_quantity(table, i) == "rate") == (wanted.kind in {None, "rate"})]

@@ -30,8 +30,9 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ":
 _WORDS = {"tab": "\t", "\\t": "\t", "blank": " ", "space": " "}
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
-ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?(Z|[+-]\d\d:?\d\d)?")
-CLOCK = re.compile(r"\d\d:\d\d:\d\d(\.\d{1,9})?")
+# ISO 8601, and day.month.year, which no one reads in another order.
+ISO = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?(Z|[+-]\d\d:?\d\d)?")
+CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")
 _MISSING = {"", "na", "n/a", "null", "none", "-"}
 _UNITLESS = re.compile(r"[\[(].*[\])]|-*")
 
@@ -329,7 +330,7 @@ def _header(
 
 
 def _is_unit(cell: str) -> bool:
-    return bool(_UNITLESS.fullmatch(cell) or quantity_of(clean_unit(cell[:_LONGEST])) or "/s" in cell)
+    return bool(_UNITLESS.fullmatch(cell) or quantity_of(clean_unit(cell[:_LONGEST])))
 
 
 def _commented(lines: list[tuple[int, str]], first: int, separator: str, n_named: int) -> tuple[list[str], int | None]:

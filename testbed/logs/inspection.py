@@ -29,7 +29,7 @@ class Finding:
     ----------
     kind : str
         ``gaps``, ``doubled``, ``backward``, ``uneven``, ``coarse``, ``wraps``, ``missing``, ``repeats``,
-        ``saturation``, ``rounding`` or ``rate``.
+        ``saturation``, ``rounding``, ``unit`` or ``rate``.
     message : str
         What, where, and what may be done.
     """
@@ -116,10 +116,12 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
     one : Plan
         How it is read.
     """
+    yield from (Finding("unit", text) for text in one.contradictions)
     if clock is not None:
         yield from _of_time(table, clock)
-        if one.rate_hz is not None and not clock.agrees_with(one.rate_hz):
-            yield Finding("rate", f"the nominal rate {one.rate_hz:g} Hz contradicts the stamps: {clock.said()}")
+        nominal = one.rate_hz or one.nominal_hz
+        if nominal is not None and clock.even and not clock.agrees_with(nominal):
+            yield Finding("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
     if values.n_missing:
         yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
     if values.repeats > 1.0:
@@ -184,7 +186,7 @@ def _places(table: Table, tally: Tally) -> str:
 
 
 def remarks(channel: LogChannel) -> list[str]:
-    """Return what a user of a channel should know: what was taken for granted, contradicts, is missing or rounded.
+    """Return what a user of a channel should know: what contradicts, is missing, or began anew.
 
     Parameters
     ----------
@@ -220,7 +222,7 @@ def report_data(report: Report) -> dict[str, Any]:
         "time": _clock_data(clock, one),
         "values": numbers,
         "saturated": values.saturated,
-        "notes": list(one.notes),
+        "assumed": list(one.assumed),
         "findings": [{"kind": finding.kind, "message": finding.message} for finding in report.findings],
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from testbed import units
@@ -47,7 +48,7 @@ class TimeMap(Part):
     unit : str, optional
         Their unit, such as ``us`` or ``0.1 ms``; dates need none.
     epoch : str, optional
-        What zero is, ISO 8601, where the numbers do not count from 1970; only for the reader's date.
+        What zero is, in ISO 8601, where the stamps do not count from 1970.
     rate : float, optional
         Sample rate [Hz] of even samples, instead of stamps.
     offset : float
@@ -67,7 +68,19 @@ class TimeMap(Part):
             raise ValueError(msg)
         if self.unit is not None:
             time_factor(self.unit)
+        _ = self.epoch_ns
         return self
+
+    @property
+    def epoch_ns(self) -> int:
+        """Zero of the stamps in nanoseconds from 1970 on."""
+        if self.epoch is None:
+            return 0
+        try:
+            return int(np.datetime64(self.epoch.removesuffix("Z"), "ns").astype(np.int64))
+        except ValueError as error:
+            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {self.epoch!r}"
+            raise ValueError(msg) from error
 
 
 class ChannelMap(Part):

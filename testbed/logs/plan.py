@@ -15,7 +15,7 @@ from testbed.logs.options import quantity as as_quantity
 from testbed.logs.options import refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from testbed.errors import ScenarioError
     from testbed.logs.table import Table
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
 ROTATIONS = ("rate", "angle")
 _COUNTS = re.compile(r"(lsb|counts?|digits?|raw|adc)", re.IGNORECASE)
-_RATES = re.compile(r"(f_?s|odr|rate_?hz|(sample|sampling|data)[ _-]?(rate|freq\w*)([ _\[(]*hz[\])]?)?)", re.IGNORECASE)
+_RATES = re.compile(
+    r"(f_?s|odr|rate_?hz|(sample|sampling|data|update|output)[ _-]?(rate|freq\w*)([ _\[(]*hz[\])]?)?)", re.IGNORECASE
+)
 # Numbers that are a date in one unit only: 1990 to 2100.
 _EPOCH_S = (6.3e8, 4.2e9)
 _PREFERRED = ("timestamp_sample", "header.stamp")
@@ -56,14 +58,18 @@ class Plan:
         Its unit [s].
     rate_hz : float, optional
         Sample rate that was said [Hz].
-    start_ns, offset_ns : int
-        First stamp where the file states a rate alone, and what is added to all [ns].
+    nominal_hz : float, optional
+        Sample rate that the file states beside its stamps [Hz].
+    offset_ns : int
+        What is added to all stamps [ns].
     time_said : bool
         Whether the stamps are to be used, or only compared with the rate.
     largest : float, optional
         Range of the sensor [SI].
-    notes : tuple of str
+    assumed : tuple of str
         What was taken for granted.
+    contradictions : tuple of str
+        What the file says otherwise.
     """
 
     name: str
@@ -78,11 +84,12 @@ class Plan:
     stamps: int | None
     time_unit: float
     rate_hz: float | None
-    start_ns: int
+    nominal_hz: float | None
     offset_ns: int
     time_said: bool
     largest: float | None
-    notes: tuple[str, ...]
+    assumed: tuple[str, ...]
+    contradictions: tuple[str, ...]
 
 
 def option_keys(field: str) -> str:
@@ -162,7 +169,13 @@ def time_columns(table: Table, group: str) -> list[int]:
 
 def channels_of(table: Table) -> list[int]:
     """Return the columns that are no time."""
-    return [i for i, label in enumerate(labels(table)) if label.quantity != "time"]
+    return [i for i, label in enumerate(labels(table)) if label.quantity != "time" and i not in unreadable(table)]
+
+
+def unreadable(table: Table) -> Collection[int]:
+    """Return the columns that hold words, or times that are not understood."""
+    found: Collection[int] = getattr(getattr(table, "inner", table), "unreadable", ())
+    return found
 
 
 def measured_quantity(table: Table, place: int) -> str:
@@ -196,7 +209,7 @@ def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys)
         If a column is not there, or a unit or kind does not fit.
     """
     place = find_column(table, channel.column, keys("column"), channel.topic)
-    unit, quantity, factor, zero, notes = _measured(channel, table, place)
+    unit, quantity, factor, zero, assumed = _measured(channel, table, place)
     if channel.kind and quantity and quantity != {"rate": "rate"}.get(channel.kind, "angle"):
         good = "deg/s" if channel.kind == "rate" else "arcsec"
         raise refusal(table.path, f"kind {channel.kind} expects a unit such as {good}, got {unit!r}", keys("kind"))
@@ -216,11 +229,12 @@ def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys)
         stamps=stamps,
         time_unit=time_unit,
         rate_hz=rate,
-        start_ns=column.start_ns or 0,
-        offset_ns=round((channel.time.offset if channel.time else 0.0) / NANO),
+        nominal_hz=column.rate_hz or _header_rate(table),
+        offset_ns=0 if channel.time is None else round(channel.time.offset / NANO) + channel.time.epoch_ns,
         time_said=said,
         largest=largest,
-        notes=(*notes, *time_notes),
+        assumed=(*assumed, *time_notes),
+        contradictions=_other_unit(channel, labels(table)[place]),
     )
 
 
@@ -230,21 +244,26 @@ def _measured(channel: ChannelMap, table: Table, place: int) -> tuple[str, str, 
     if channel.scale is not None:
         value, quantity = measure(channel.scale)
         return channel.scale, quantity, value, 0.0, []
-    unit, notes = channel.unit or label.unit, []
+    unit = channel.unit or label.unit
     if channel.unit is None and not unit and (said := _preamble_scale(table, label.name)):
         unit, value = said, measure(said)[0]
         return unit, "rate", value, 0.0, [f"{label.name}: {unit} a count, as the preamble says"]
-    if channel.unit and label.unit and channel.unit != label.unit and quantity_of(label.unit):
-        given, written = (_factor(text) for text in (channel.unit, label.unit))
-        if given != written:
-            notes.append(f"{label.name}: the file says {label.unit}, {channel.unit} was asked for and is used")
     quantity = quantity_of(unit)
     if not quantity:
-        return unit if not _COUNTS.fullmatch(unit) else "", "", 1.0, 0.0, notes
+        return unit if not _COUNTS.fullmatch(unit) else "", "", 1.0, 0.0, []
     if quantity == "temperature":
         zero = units.parse(f"0 {unit}", "K")
-        return unit, quantity, units.parse(f"1 {unit}", "K") - zero, zero, notes
-    return unit, quantity, _factor(unit), 0.0, notes
+        return unit, quantity, units.parse(f"1 {unit}", "K") - zero, zero, []
+    return unit, quantity, _factor(unit), 0.0, []
+
+
+def _other_unit(channel: ChannelMap, label: Label) -> tuple[str, ...]:
+    """Return that the file gives a column another unit than the one asked for, if it does."""
+    if not (channel.unit and quantity_of(channel.unit) and quantity_of(label.unit)):
+        return ()
+    if quantity_of(channel.unit) == quantity_of(label.unit) and _factor(channel.unit) == _factor(label.unit):
+        return ()
+    return (f"contradiction: {label.name} is in {label.unit} by the file; {channel.unit} was asked for and is used",)
 
 
 def _factor(unit: str) -> float:
@@ -267,7 +286,7 @@ def _timed(
         unit, note = _time_unit(table, stamps, said.unit, keys, guessed=False)
         return stamps, unit, None, True, note
     if said is not None:
-        found = time_columns(table, column.group)
+        found = [i for i in time_columns(table, column.group) if i not in unreadable(table)]
         if len(found) == 1 and not _ambiguous_unit(table, found[0]):
             return found[0], _time_unit(table, found[0], None, keys, guessed=True)[0], said.rate, False, []
         return None, 1.0, said.rate, False, []
@@ -275,6 +294,10 @@ def _timed(
     if len(found) > 1:
         names = _few([table.columns[i].name for i in found])
         raise refusal(table.path, f"expected one column of time, got {names}: say which", keys("time.column"))
+    if found and found[0] in unreadable(table):
+        name = table.columns[found[0]].name
+        message = f"the times in {name!r} are no numbers and not ISO 8601: convert them, or give --rate"
+        raise refusal(table.path, message, keys("time.column"))
     if found:
         unit, note = _time_unit(table, found[0], None, keys, guessed=True)
         return found[0], unit, None, True, note
@@ -310,7 +333,7 @@ def _time_unit(table: Table, stamps: int, said: str | None, keys: Keys, *, guess
     if epoch_unit:
         return time_factor(epoch_unit), [f"time {label.name!r} in {epoch_unit}: only so it is a date"]
     if kind == "integer" and guessed:
-        message = f"expected the unit of the time {label.name!r}, whose whole numbers may be anything"
+        message = f"expected the unit of the time {label.name!r}, such as us: its whole numbers may be anything"
         raise refusal(table.path, message, keys("time.unit"))
     return 1.0, [f"time {label.name!r} in s: no unit was given"]
 

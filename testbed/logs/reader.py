@@ -195,11 +195,15 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
         raise refusal(table.path, message, line=table.line(row))
     stamps, clock = timed if timed else (None, None)
-    notes = [*one.notes, *table.notes]
+    notes = [*one.contradictions, *table.notes]
     if clock is not None and not one.time_said:
         assert one.rate_hz is not None
         notes += _contradiction(one, clock)
         stamps, clock = None, None
+    elif clock is not None and one.nominal_hz is not None and clock.even and not clock.agrees_with(one.nominal_hz):
+        notes.append(
+            f"contradiction: the file says {one.nominal_hz:g} Hz, its stamps {clock.said()}; the stamps are used"
+        )
     rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
     si = _in_si(numbers, one)
     return LogChannel(
@@ -212,6 +216,7 @@ def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], Ti
         stamps_ns=None if stamps is None else stamps + one.offset_ns,
         clock=clock,
         rate_hz=rate_hz,
+        assumed=one.assumed,
         notes=tuple(notes),
         table=table,
         largest=one.largest,

@@ -25,6 +25,8 @@ class TextOptions:
         Such as ``utf-8``, ``utf-16``, ``cp1252``.
     skip : int, optional
         Lines to leave out before the header, or before the first row where there is none.
+    missing : str, optional
+        Word that stands for a missing value, beside an empty field, ``nan`` and the like.
     """
 
     PANEL: ClassVar[str] = "Text file"
@@ -39,6 +41,9 @@ class TextOptions:
     encoding: str | None = field(default=None, metadata=_words("--encoding", "Encoding of a text, such as cp1252."))
     skip: int | None = field(
         default=None, metadata=_words("--skip", "Lines of a text to leave out at its head.", "LINES")
+    )
+    missing: str | None = field(
+        default=None, metadata=_words("--missing", "Word of a text that stands for a missing value.", "WORD")
     )
 
 

@@ -30,8 +30,6 @@ class TableColumn:
         Number of samples, where the format says it.
     rate_hz : float, optional
         Sample rate that the file itself states [Hz].
-    start_ns : int, optional
-        Stamp of the first sample that the file itself states [ns].
     """
 
     name: str
@@ -39,7 +37,6 @@ class TableColumn:
     group: str = ""
     n_time: int | None = None
     rate_hz: float | None = None
-    start_ns: int | None = None
 
     @property
     def short(self) -> str:

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 WIDTH_IN = 9.2
 DEGREE = float(np.degrees(1.0))
-# Slower than this is read in deg/h [rad/s]; a little faster than the Earth.
-SLOW = np.radians(20.0) / 3600.0
 # Longer than this is read in hours [s].
 HOURS_FROM = 7200.0
 # Hours between two marks, the first that leaves at most twelve of them.
@@ -65,11 +63,6 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
 def label(group: str) -> str:
     """Return the instance's name; a dollar sign would start a formula."""
     return group.split("/", 1)[-1].replace("$", r"\$")
-
-
-def rate_unit(highest: float) -> tuple[str, float]:
-    """Return the unit for rates up to `highest` [rad/s] and what a rate in rad/s is multiplied by for it."""
-    return ("deg/h", 3600.0 * DEGREE) if 0.0 < highest < SLOW else ("deg/s", DEGREE)
 
 
 def decade_axis(axes: Axes) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from testbed.pages.numbers import fixed, plain, significant
+from testbed.pages.numbers import bounded, fixed, plain, significant
 from testbed.pages.svg import svg_text
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"significant": significant, "fixed": fixed, "plain": plain}
+    environment.filters |= {"significant": significant, "bounded": bounded, "fixed": fixed, "plain": plain}
     # Globals, so that the macros of a template see them too.
     environment.globals |= values
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Drawing units: Rerun's 2-D view has equal axes, y pointing down, so the plot is a box into which the curve is scaled.
 WIDTH, HEIGHT = 160.0, 90.0
+# What a table at rest leaves is arithmetic and no profile; its scale would not fit a single-precision number [rad/s].
+SMALLEST = 1e-14
 FRACTIONS = (1 / 32, 1 / 8, 1 / 2)  # of the channel height; the flow is symmetric for a rotating wall
 
 
@@ -73,7 +75,7 @@ class Channel:
     def finish(self) -> None:
         """Send what is held back and draw the axes, whose range is known only now."""
         self._batch.flush()
-        full = nice_ceiling(self._largest or 1.0)
+        full = nice_ceiling(self._largest if self._largest > SMALLEST else 1.0)
         top = float(self._heights.max())
         to_box = rr.Transform3D(scale=[WIDTH / 2 / full, -HEIGHT / top, 1.0])
         style = rr.LineStrips2D.from_fields(

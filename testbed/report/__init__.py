@@ -14,6 +14,7 @@ from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
+from testbed.runs.table import error_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,9 +64,13 @@ def run_figures(run: RunRecord) -> dict[str, Figure]:
 
 
 def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
+    figures, (unit, scale) = _figures(metrics, digest), error_unit(metrics)
     return render(
         "report.html.j2",
-        _figures(metrics, digest),
+        figures,
+        figure_number={name: number for number, name in enumerate(figures, 1)},
+        unit=unit,
+        scale=scale,
         ratios=RATIOS,
         over_bound=over_bound,
         honesty=honesty,
@@ -84,15 +89,10 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
 
 
 def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
-    """Return the columns of the error table; peak error and optimum only where they are known."""
+    """Return the columns of the error table: those in which some source has a value, and the error."""
     sources = [*metrics.sensors.values(), *metrics.fusion.values()]
-    unknown = [
-        key
-        for key in ("peak_error_deg_s", "optimum_rmse_deg_s")
-        if all(getattr(source, key) is None for source in sources)
-    ]
-    # A ratio to an optimum that is not known is no column either.
-    return {key: name for key, name in METRICS.items() if {key, RATIOS.get(key)}.isdisjoint(unknown)}
+    known = {key for key in METRICS if any(getattr(source, RATIOS.get(key, key)) is not None for source in sources)}
+    return {key: name for key, name in METRICS.items() if key in {"rmse_deg_s", *known}}
 
 
 def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
@@ -104,14 +104,14 @@ def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
 
 
 def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
-    colors = series_colors(list(metrics.sensors), list(metrics.fusion))
-    drawn = {"rates": rates_figure(digest, colors)}
+    colors, unit = series_colors(list(metrics.sensors), list(metrics.fusion)), error_unit(metrics)
+    drawn = {"rates": rates_figure(digest, colors, unit)}
     if digest.filter_errors:
-        drawn["errors"] = errors_figure(digest, colors)
+        drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:
-        drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density)
+        drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density, unit)
     if digest.thermal:
-        drawn["thermal"] = thermal_figure(digest, colors)
+        drawn["thermal"] = thermal_figure(digest, colors, unit)
     if metrics.budget is not None:
-        drawn["budget"] = budget_figure(metrics.budget, colors)
+        drawn["budget"] = budget_figure(metrics.budget, colors, unit)
     return drawn

@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
 from testbed.pages.numbers import plain, significant
 from testbed.pages.svg import INK, STYLE
-from testbed.report.figures import DASHES
+from testbed.report.figures import DASHES, DEG_S, Unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from testbed.runs.metrics import Budget, RunMetrics, SourceMetrics
 
 
-def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
+def budget_figure(budget: Budget, colors: Mapping[str, str], unit: Unit = DEG_S) -> Figure:
     """Draw the input-referred noise of every sensor, that of their best combination, and the crossovers.
 
     Parameters
@@ -32,11 +32,13 @@ def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
         Root densities [deg/s/sqrt(Hz)] against frequency [Hz].
     colors : Mapping
         Group (``sensors/mhd_ars``, ...) to color.
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
 
     Returns
     -------
     Figure
-        One axes, log-log, deg/s/sqrt(Hz) against Hz.
+        One axes, log-log, root density against Hz.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 3.9))
@@ -48,20 +50,21 @@ def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
             values = np.array([np.nan if one is None else one for one in density])
             handles += axes.plot(
                 budget.frequency_hz,
-                values,
+                unit[1] * values,
                 color=colors[f"sensors/{name}"],
                 linewidth=1.9,
                 linestyle=DASHES[i % len(DASHES)],
                 label=label(name),
             )
-        handles += axes.plot(
-            budget.frequency_hz,
-            budget.combined(),
-            color=INK,
-            linewidth=1.5,
-            linestyle=(0, (1, 1.2)),
-            label="best combination (noise floor)",
-        )
+        if len(budget.densities) > 1:
+            handles += axes.plot(
+                budget.frequency_hz,
+                unit[1] * budget.combined(),
+                color=INK,
+                linewidth=1.5,
+                linestyle=(0, (1, 1.2)),
+                label="best combination (noise floor)",
+            )
         low, high = budget.frequency_hz[0], budget.frequency_hz[-1]
         for freq in [freq for freq in budget.crossovers_hz if low <= freq <= high]:
             axes.axvline(freq, color=INK, linewidth=0.9, alpha=0.6, linestyle=(0, (5, 2)), zorder=0.5)
@@ -71,7 +74,7 @@ def budget_figure(budget: Budget, colors: Mapping[str, str]) -> Figure:
             )  # fmt: skip
         axes.set_xlim(low, 1.1 * high)
         axes.set_xlabel("frequency [Hz]")
-        axes.set_ylabel("noise, input-referred, two-sided [deg/s/√Hz]")
+        axes.set_ylabel(f"noise, input-referred, two-sided [{unit[0]}/√Hz]")
         axes.xaxis.set_major_locator(LogLocator(numticks=20))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
         axes.xaxis.set_minor_formatter(NullFormatter())

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, rate_unit, time_axis
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, time_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.svg import INK, STYLE
 
@@ -35,8 +35,16 @@ DASHES: tuple[tuple[float, tuple[float, ...] | None], ...] = (
 )
 
 
-def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
-    """Draw the rates: the whole run above, a zoom below.
+# Unit of the rates, and what deg/s is multiplied by for it.
+Unit = tuple[str, float]
+DEG_S: Unit = ("deg/s", 1.0)
+DASHED = (0, (4.0, 2.4))
+
+
+def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) -> Figure:
+    """Draw the rates: the whole run of the sensors above, then a zoom of them, and of the filters below.
+
+    The truth is dashed over the sensors, so that it hides none of them, and wide beneath the filters.
 
     Parameters
     ----------
@@ -44,48 +52,63 @@ def rates_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         Traces of the run.
     colors : Mapping
         Group (``truth``, ``sensors/mhd_ars``, ...) to color.
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
 
     Returns
     -------
     Figure
-        Two axes, deg/s against s; deg/h for slow rates, and hours for a long run.
+        Two axes, three with filters: rate against s, against hours of a long run.
     """
-    unit, scale = rate_unit(_highest([trace.whole for trace in digest.rates.values()]))
+    name, scale = unit[0], unit[1] * DEGREE
+    sensors = [group for group in digest.rates if group.startswith("sensors/")]
+    filters = [group for group in digest.rates if group.startswith("fusion/")]
+    # The widest first: what is narrower stands before it and hides nothing.
+    sensors.sort(key=lambda group: -_highest([digest.rates[group].whole]))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, 5.4))
-        above, below = figure.subplots(2, 1, height_ratios=[2, 3])
-        sensors = [group for group in digest.rates if group.startswith("sensors/")]
-        filters = [group for group in digest.rates if group.startswith("fusion/")]
+        figure = Figure(figsize=(WIDTH_IN, 7.4 if filters else 5.2))
+        above, *zooms = figure.subplots(3 if filters else 2, 1, height_ratios=[2, 2.4, 2.4][: 3 if filters else 2])
+        for axes, part in ((above, "whole"), (zooms[0], "zoom")):
+            for group in sensors:
+                draw(axes, getattr(digest.rates[group], part), colors[group], 0.9, scale=scale)
+            _dash_truth(axes, getattr(digest.rates["truth"], part), colors["truth"], scale)
+        if filters:
+            draw(zooms[1], digest.rates["truth"].zoom, colors["truth"], 4.2, scale=scale)
         # Later lines are thinner, so that lines which lie on each other all stay visible.
-        widths = {"truth": 4.2, **dict.fromkeys(sensors, 1.4)}
-        widths |= {group: 2.2 * 0.7**i for i, group in enumerate(filters)}
-        for group in [*sensors, "truth"]:
-            draw(above, digest.rates[group].whole, colors[group], 0.9, scale=scale)
-        for group, width in widths.items():
-            draw(below, digest.rates[group].zoom, colors[group], width, scale=scale)
+        for i, group in enumerate(filters):
+            draw(zooms[1], digest.rates[group].zoom, colors[group], 2.2 * 0.7**i, scale=scale)
         commanded = digest.rates["commanded"].zoom
         middle = scale * (commanded.low + commanded.high) / 2
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
         moved = bool(np.any(middle))
         if moved:
-            below.plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
+            zooms[-1].plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
         above.axvspan(*digest.zoom_s, color=INK, alpha=0.08, linewidth=0)
-        above.set_title("Whole run (shaded: the zoom below)", loc="left")
-        below.set_title(f"Zoom, {plain(digest.zoom_s[0])} s to {plain(digest.zoom_s[1])} s", loc="left")
+        span = f"{digest.zoom_s[0]:.4g} s to {digest.zoom_s[1]:.4g} s"
+        above.set_title("Sensors, whole run (shaded: the zoom below)", loc="left")
+        for axes, what in zip(zooms, ("Sensors", "Filters"), strict=False):
+            axes.set_title(f"{what}, {span}", loc="left")
+            axes.set_xlim(*digest.zoom_s)
         above.set_xlim(0, digest.duration_s)
-        below.set_xlim(*digest.zoom_s)
-        for axes in (above, below):
-            axes.set_ylabel(f"rate [{unit}]")
+        for axes in (above, *zooms):
+            axes.set_ylabel(f"rate [{name}]")
             axes.grid(visible=True)
         time_axis(above, digest.duration_s, named=digest.duration_s >= HOURS_FROM)
-        time_axis(below, digest.zoom_s[1] - digest.zoom_s[0])
+        for axes in zooms:
+            time_axis(axes, digest.zoom_s[1] - digest.zoom_s[0], named=axes is zooms[-1])
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=colors[group], linewidth=max(width, 1.2), label=label(group))
-            for group, width in widths.items()
+            Line2D([], [], color=colors[group], linewidth=2.2, label=label(group))
+            for group in ["truth", *(group for group in digest.rates if group in {*sensors, *filters})]
         ]
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
-        arrange(figure, [dotted, *handles] if moved else handles, gap_in=0.62)
+        arrange(figure, [*handles, dotted] if moved else handles, gap_in=0.62)
     return figure
+
+
+def _dash_truth(axes: Axes, truth: Envelope, color: str, scale: float) -> None:
+    """Draw the edges of the truth, dashed: what lies beneath shows through."""
+    for edge in (truth.low, truth.high):
+        axes.plot(truth.time, scale * edge, color=color, linewidth=1.5, linestyle=DASHED)
 
 
 def _highest(envelopes: Sequence[Envelope]) -> float:
@@ -94,9 +117,9 @@ def _highest(envelopes: Sequence[Envelope]) -> float:
     return float(np.max(extremes, where=np.isfinite(extremes), initial=0.0))
 
 
-def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
+def errors_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) -> Figure:
     """Draw the error of each filter over time in a panel of its own, with the band of two standard deviations it
-    predicts.
+    claims.
 
     Parameters
     ----------
@@ -104,29 +127,34 @@ def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         Traces of the run.
     colors : Mapping
         Group (``fusion/kalman``, ...) to color.
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
 
     Returns
     -------
     Figure
-        One axes for each filter, deg/s against s.
+        One axes for each filter, error against s.
     """
     errors = digest.filter_errors
-    limits = _common_limits({name: _settled_extreme(trace, digest.settle_s) for name, trace in errors.items()})
+    limits = _common_limits(
+        {name: unit[1] * _settled_extreme(trace, digest.settle_s) for name, trace in errors.items()}
+    )
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.7 * len(errors)))
         panels = figure.subplots(len(errors), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (name, trace) in zip(panels, errors.items(), strict=True):
-            _error_panel(axes, trace, colors[f"fusion/{name}"], limits[name])
+            _error_panel(axes, trace, colors[f"fusion/{name}"], limits[name], unit)
             axes.axvspan(0, digest.settle_s, color=INK, alpha=0.08, linewidth=0)
             inside = "undefined" if trace.inside is None else f"{100 * trace.inside:.1f} %"
             axes.set_title(
-                f"{label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name])}", loc="left"
+                f"{label(name)}: {inside} of the samples inside ±2 std{_cut_note(trace, limits[name], unit)}",
+                loc="left",
             )
         panels[-1].set_xlim(0, digest.duration_s)
         time_axis(panels[-1], digest.duration_s)
         handles: list[Line2D | Patch] = [
             Patch(facecolor="#8a8a8a", label="error (its extremes)"),
-            Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (5, 2)), label="±2 std predicted"),
+            Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (5, 2)), label="±2 std claimed"),
         ]
         if digest.settle_s > 0:
             handles.append(Patch(facecolor=INK, alpha=0.08, label="before settle, not judged"))
@@ -134,14 +162,14 @@ def errors_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
     return figure
 
 
-def _error_panel(axes: Axes, trace: ErrorTrace, color: str, limit: float) -> None:
-    draw(axes, trace.whole, color, 0.6)
+def _error_panel(axes: Axes, trace: ErrorTrace, color: str, limit: float, unit: Unit) -> None:
+    draw(axes, trace.whole, color, 0.6, scale=unit[1] * DEGREE)
     if trace.std is not None:
         for sign in (-2.0, 2.0):
-            band = sign * np.degrees(trace.std.high)
+            band = sign * unit[1] * np.degrees(trace.std.high)
             axes.plot(trace.std.time, band, color=INK, linewidth=1.1, linestyle=(0, (5, 2)))
     axes.set_ylim(-limit, limit)
-    axes.set_ylabel("error [deg/s]")
+    axes.set_ylabel(f"error [{unit[0]}]")
     axes.grid(visible=True)
 
 
@@ -168,13 +196,15 @@ def _common_limits(extremes: Mapping[str, float]) -> dict[str, float]:
     return limits
 
 
-def _cut_note(trace: ErrorTrace, limit: float) -> str:
+def _cut_note(trace: ErrorTrace, limit: float, unit: Unit) -> str:
     highest = np.fmax.reduce(np.fmax(np.abs(trace.whole.low), np.abs(trace.whole.high)))
-    reached = float(np.degrees(highest))
-    return f" (start-up reaches {significant(reached, 2)} deg/s)" if reached > limit else ""
+    reached = unit[1] * float(np.degrees(highest))
+    return f" (start-up reaches {significant(reached, 2)} {unit[0]})" if reached > limit else ""
 
 
-def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensity | None) -> Figure:
+def spectrum_figure(
+    digest: Digest, colors: Mapping[str, str], floor: FloorDensity | None, unit: Unit = DEG_S
+) -> Figure:
     """Draw the two-sided root density of the errors after settle, and of the noise floor if it is known.
 
     Parameters
@@ -185,11 +215,13 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
         Group (``sensors/mhd_ars``, ``fusion/kalman``, ...) to color.
     floor : FloorDensity or None
         Root density of the floor [deg/s/sqrt(Hz)].
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
 
     Returns
     -------
     Figure
-        One axes, log-log, deg/s/sqrt(Hz) against Hz.
+        One axes, log-log, root density against Hz.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 4.6))
@@ -200,7 +232,7 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
         for kind, width, errors in (("sensors", 0.9, digest.sensor_errors), ("fusion", 1.9, digest.filter_errors)):
             for i, (name, trace) in enumerate(errors.items()):
                 shown = trace.density > 0
-                root = np.degrees(np.sqrt(trace.density[shown]))
+                root = unit[1] * np.degrees(np.sqrt(trace.density[shown]))
                 handles += axes.plot(
                     trace.freq_hz[shown],
                     root,
@@ -212,20 +244,20 @@ def spectrum_figure(digest: Digest, colors: Mapping[str, str], floor: FloorDensi
         if floor is not None:
             handles += axes.plot(
                 floor.frequency_hz,
-                floor.density,
+                unit[1] * np.array(floor.density),
                 color=INK,
                 linewidth=1.5,
                 linestyle=(0, (1, 1.2)),
                 label="noise floor",
             )
-        _frame_spectrum(axes, digest)
+        _frame_spectrum(axes, digest, unit)
         arrange(figure, handles)
     return figure
 
 
-def _frame_spectrum(axes: Axes, digest: Digest) -> None:
+def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("error root density, two-sided [deg/s/√Hz]")
+    axes.set_ylabel(f"error root density, two-sided [{unit[0]}/√Hz]")
     axes.xaxis.set_major_locator(LogLocator(numticks=20))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
     axes.xaxis.set_minor_formatter(NullFormatter())
@@ -249,7 +281,7 @@ def _frame_spectrum(axes: Axes, digest: Digest) -> None:
         )  # fmt: skip
 
 
-def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
+def thermal_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) -> Figure:
     """Draw what the temperature does to the sensors that have a thermometer: its readings above, error and true drift
     below.
 
@@ -259,14 +291,16 @@ def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
         Traces of the run.
     colors : Mapping
         Group (``truth``, ``sensors/fog``, ...) to color.
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
 
     Returns
     -------
     Figure
-        Two axes, degC and deg/h (or deg/s) against s or h.
+        Two axes, degC and rate against s or h.
     """
     errors = {name: digest.sensor_errors[name].whole for name in digest.thermal}
-    unit, scale = rate_unit(_highest(list(errors.values())))
+    scale = unit[1] * DEGREE
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 5.0))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 3])
@@ -282,7 +316,7 @@ def thermal_figure(digest: Digest, colors: Mapping[str, str]) -> Figure:
                 trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=dashes, label="true thermal drift"
             )
         above.set_ylabel("temperature [°C]")
-        below.set_ylabel(f"error [{unit}]")
+        below.set_ylabel(f"error [{unit[0]}]")
         below.set_xlim(0, digest.duration_s)
         time_axis(below, digest.duration_s)
         for axes in (above, below):

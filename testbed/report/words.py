@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from testbed.pages.numbers import plain, significant
+from testbed.runs.table import error_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +22,7 @@ METRICS = {
     "optimum_rmse_deg_s": "optimum of this run",
     "optimum_settled_deg_s": "settled optimum",
     "optimum_ratio": "RMSE / optimum",
-    "mean_std_deg_s": "predicted std",
+    "mean_std_deg_s": "claimed std",
 }
 # Columns that are the RMSE over a bound.
 RATIOS = {"ratio": "floor_rmse_deg_s", "optimum_ratio": "optimum_rmse_deg_s"}
@@ -54,22 +55,26 @@ def summary(metrics: RunMetrics, digest: Digest) -> str:
 
 def _accuracy(metrics: RunMetrics) -> list[str]:
     best, sensor = _best(metrics.fusion), _best(metrics.sensors)
+    unit, scale = error_unit(metrics)
     if best is None:
-        return ["No filter has a defined error."]
+        if metrics.fusion or sensor is None:
+            return ["No filter has a defined error."]
+        error = metrics.sensors[sensor].rmse_deg_s or 0.0
+        among = "The most accurate sensor is" if len(metrics.sensors) > 1 else "The sensor is"
+        return [f"{among} {sensor}: its error is {significant(scale * error)} {unit} rms. No filter was run."]
     rmse = metrics.fusion[best].rmse_deg_s or 0.0
     among = (
         f"Of {len(metrics.fusion)} filters {best} is the most accurate"
         if len(metrics.fusion) > 1
         else f"The filter {best} was run"
     )
-    text = [f"{among}: its error is {significant(rmse)} deg/s rms, phase included."]
+    text = [f"{among}: its error is {significant(scale * rmse)} {unit} rms, phase included."]
     alone = metrics.sensors[sensor].rmse_deg_s if sensor else None
     if alone and rmse > 0:
         factor = alone / rmse
+        which = f"the best sensor alone ({sensor}," if len(metrics.sensors) > 1 else f"the sensor alone ({sensor},"
         compared = f"{significant(factor)} times smaller" if factor >= 1 else f"{significant(1 / factor)} times larger"
-        text.append(
-            f"That is {compared} than the error of the best sensor alone ({sensor}, {significant(alone)} deg/s)."
-        )
+        text.append(f"That is {compared} than the error of {which} {significant(scale * alone)} {unit}).")
     ratio, to_optimum = (over_bound(metrics.fusion[best], column) for column in RATIOS)
     if ratio is not None:
         known = (
@@ -126,7 +131,7 @@ def _expectations(metrics: RunMetrics) -> str:
         return (
             "The one expectation of the scenario was met."
             if n_all == 1
-            else f"All {n_all} expectations of the scenario were met."
+            else f"{'Both' if n_all == 2 else f'All {n_all}'} expectations of the scenario were met."
         )
     missed = ", ".join(f"{item.subject} {item.metric} {item.bound}" for item in metrics.expectations if not item.met)
     return f"{n_all - n_met} of {n_all} expectations of the scenario missed: {missed}."

@@ -164,10 +164,10 @@ def test_a_model_survives_json(models, method):
 
 @pytest.mark.parametrize(
     "change",
-    [{"version": 2}, {"format": "other"}, {"machine": {}}, {"method": "magic"}, {"features": {"lags": [-1.0]}}],
+    [{"version": 1}, {"format": "other"}, {"machine": {}}, {"method": "magic"}, {"features": {"lags": [-1.0]}}],
 )
 def test_a_document_that_is_no_model_is_refused(models, change):
-    with pytest.raises(ValueError, match=r"drift model|features"):
+    with pytest.raises(ValueError, match=r"ModelDocument"):
         DriftModel.from_dict({**models["gradient"].to_dict(), **change})
 
 

@@ -29,7 +29,6 @@ def work(jobs, results, folder):
     for kind, seed in iter(jobs.get, None):
         results.put((os.getpid(), kind, seed, None, 0))
         results.put((os.getpid(), kind, seed, play(case(kind, seed), path), memory() - base))
-    results.put((os.getpid(), None, None, None, 0))
 
 
 class Table:
@@ -84,7 +83,7 @@ def run(kinds, cases, workers, first, out):
 
         for _ in range(workers):
             spawn()
-        while living:
+        while sum(table.counts.values()) < cases:
             table.progress()
             now = time.monotonic()
             try:
@@ -93,12 +92,11 @@ def run(kinds, cases, workers, first, out):
                 pid = None
             if pid in living:
                 living[pid][1:] = now, (kind, seed) if result is None and kind else None
-                if kind is None:
-                    living.pop(pid)[0].join()
-                elif result is not None:
+                if result is not None:
                     table.add(kind, seed, result, grown)
             for pid, (process, heard, at) in list(living.items()):
-                if process.is_alive() and now - heard < _SILENCE:
+                # One that ended by itself has done its part; its last words may still be on their way.
+                if process.exitcode == 0 or (process.is_alive() and now - heard < _SILENCE):
                     continue
                 process.kill()
                 process.join()
@@ -106,4 +104,7 @@ def run(kinds, cases, workers, first, out):
                 if at:
                     table.add(*at, Result("killed", now - heard, f"hung or died, exit code {process.exitcode}"), 0)
                 spawn()
+        for process, _, _ in living.values():
+            process.kill()
+            process.join()
     return table

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import json
 import random
 import re
-from io import StringIO
 from pathlib import Path
 
 from ruamel.yaml import YAML
@@ -102,17 +104,14 @@ TOKENS = (
 )
 
 
+@functools.cache
 def loaded(text):
     return YAML(typ="safe", pure=True).load(text)
 
 
 def dumped(tree):
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
-    yaml.width = 4096
-    stream = StringIO()
-    yaml.dump(tree, stream)
-    return stream.getvalue()
+    """Return a tree as YAML in flow style, which JSON is."""
+    return json.dumps(tree, ensure_ascii=False, default=str)
 
 
 def base(rng):
@@ -167,7 +166,7 @@ def changed(rng, value):
 
 def mutated(rng, text):
     """Return the text of a scenario whose tree was changed in one to four places."""
-    tree = loaded(text)
+    tree = copy.deepcopy(loaded(text))
     for _ in range(rng.choice((1, 1, 2, 4))):
         *path, last = rng.choice(list(places(tree)))
         node = tree

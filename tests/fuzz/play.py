@@ -54,12 +54,12 @@ def within(seconds):
 
 def check(path):
     """Do what `testbed check` does."""
-    from testbed.cli.terminal import print_scenario
-    from testbed.cli.understood import scenario_document
+    from testbed.cli.understood import doubts, print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
     scenario = load_scenario(path)
+    doubts(scenario)
     facts = table_facts(scenario)
     json.dumps(scenario_document(scenario, facts), allow_nan=False)
     print_scenario(scenario, facts)

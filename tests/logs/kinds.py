@@ -78,6 +78,13 @@ TEXTS = {
     "increments": (lines(digits(RATE / FS * 3600.0, "{:.9g}"), head="dtheta_arcsec\n"), "utf-8",
                    {"rate": "1000", "kind": "increment"}),
     "angle": (lines(digits(ANGLE, "{:.12g}"), head="angle [arcsec]\n"), "utf-8", {"rate": "1000", "kind": "angle"}),
+    "unit of the time alone": (lines([str(10 * int(t) // 1000) for t in TIME_US], DEG, head="clock,w [deg/s]\n"), "utf-8", {"time_unit": "0.1 ms"}),
+    "day before month, comma in seconds": (
+        lines([f"01.05.2024 12:00:{int(t) // 10**6:02d},{int(t) // 1000 % 1000:03d}" for t in TIME_US], comma(DEG), head="Zeit;Rate [°/s]\n", separator=";"), "utf-8", {}),
+    "number of the row": (lines(list(map(str, range(N_TIME))), SECONDS, DEG, head=",time,rate\n"), "utf-8", {"unit": "deg/s"}),
+    "a word that means none": (lines([*SECONDS, "4.000"], [*DEG, "OVF"], head="t,w [deg/s]\n"), "utf-8", {"text": {"missing": "OVF"}}),
+    "several tables of words": (
+        lines(["IMU"] * N_TIME, list(map(str, TIME_US)), DEG, separator=", "), "utf-8", {"column": ["3"], "time": "2", "time_unit": "us", "unit": "deg/s"}),
     "rate stated in the head": (lines(DEG, head="# fs = 1 kHz\nrate [deg/s]\n"), "utf-8", {}),
     "counter that wraps": (
         lines([str((int(t) + (1 << 32) - 1_500_000) % (1 << 32)) for t in TIME_US], DEG, head="us,w [deg/s]\n"), "utf-8", {}),

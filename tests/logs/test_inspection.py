@@ -117,7 +117,7 @@ def test_json_names_what_is_open_and_what_was_found(tmp_path):
 MAP = """\
 file: log.csv
 channels:
-  gyro: {column: "w [deg/s]", sign: -1, time: {column: t, unit: s, offset: 1 ms}, range: 500 deg/s}
+  gyro: {column: "w [deg/s]", sign: -1, time: {column: t, unit: s, offset: 1 ms, epoch: '2024-01-01'}, range: 500 deg/s}
   raw: {column: counts, scale: 0.002 deg/s, time: {rate: 1 kHz}}
 """
 
@@ -128,7 +128,7 @@ def test_a_map_scales_turns_and_shifts(tmp_path):
     log = read_log(tmp_path / "log.csv", map=tmp_path / "map.yaml")
     gyro, raw = log.channels["gyro"], log.channels["raw"]
     np.testing.assert_allclose(gyro.values, -np.deg2rad(RATE), atol=1e-12)
-    assert gyro.stamps_ns[0] == 1_000_000
+    assert gyro.stamps_ns[0] == np.datetime64("2024-01-01T00:00:00.001", "ns").astype(np.int64)
     np.testing.assert_allclose(raw.values, np.deg2rad(0.002 * COUNTS), rtol=1e-12)
     assert raw.rate_hz == 1000.0
 
@@ -150,6 +150,14 @@ def test_a_wrong_map_is_refused_with_its_line(tmp_path, old, new, line, message)
     with pytest.raises(ScenarioError, match=message) as caught:
         read_log(tmp_path / "log.csv", map=tmp_path / "map.yaml")
     assert caught.value.problems[0].line == line
+
+
+def test_a_map_says_the_range_and_inspection_heeds_it(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(lines(SECONDS, DEG, list(map(str, COUNTS)), head="t,w [deg/s],counts\n"))
+    (tmp_path / "map.yaml").write_text(MAP.replace("500 deg/s", f"{abs(RATE).max():.6f} deg/s"))
+    found = json.loads(call("log", "inspect", path, "--map", "map.yaml", "--json", cwd=tmp_path).stdout)
+    assert [finding["kind"] for finding in found["channels"][0]["findings"]] == ["saturation"]
 
 
 def test_a_map_names_consecutive_files_and_may_stand_for_them(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,9 @@ def test_every_kind_of_text_gives_its_samples(tmp_path, kind):
     path = tmp_path / "log.dat"
     path.write_bytes(text.encode(encoding))
     (record,) = read(path, *chosen(options))
+    if kind == "a word that means none":
+        assert np.isnan(record.rate[-1])
+        record = replace(record, rate=record.rate[:-1])
     expected = np.deg2rad(0.002 * COUNTS if kind in {"counts", "preamble"} else RATE)
     # Angles are differenced, and carry 12 digits of 1e3 arcsec at 1 kHz; all else is read as it was written.
     accuracy = 1e-11 / FS * 1e6 if kind == "angle" else 2e-9
@@ -97,3 +102,21 @@ def test_stamps_of_the_epoch_keep_their_nanoseconds(tmp_path):
     block = next(log.blocks([0, 1], [0]))
     assert block[0].dtype == np.int64
     assert block[0][1] - block[0][0] == 1_000_000
+
+
+def test_times_that_are_not_understood_are_named_and_a_rate_goes_on(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(lines([f"05/01/24 12:00:{k:02d}" for k in range(60)], DEG[:60], head="time,w [deg/s]\n"))
+    with pytest.raises(ScenarioError, match="not ISO 8601: convert them, or give --rate"):
+        read(path)
+    assert read(path, Selection(rate="1 Hz"))[0].rate.size == 60
+
+
+def test_a_rate_in_the_head_that_contradicts_the_stamps_is_told(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("# fs = 52 Hz\n" + lines(SECONDS, DEG, head="t,w [deg/s]\n"))
+    (record,) = read(path)
+    assert record.sample_rate_hz == pytest.approx(FS)
+    assert any("contradiction: the file says 52 Hz" in note for note in record.notes)
+    (record,) = read(path, Selection(rate="500"))
+    assert any("contradiction: the nominal rate is 500 Hz" in note for note in record.notes)

@@ -13,12 +13,17 @@ BEGIN, END = "<!-- commands, written by `make readme` -->\n", "<!-- end of the c
 
 def row(words: str, command: Any) -> str:
     """Return the row of a command: arguments, options but --json and --quiet, groups of options, summary."""
-    parts = [words, *(part.metavar + ("..." if part.nargs == -1 else "") for part in arguments(command))]
+    parts = [words, *(_placeholder(part) for part in arguments(command))]
     mine = {word: part for word, part in options(command).items() if word not in ("--json", "--quiet", "--help")}
     own = [word for word, part in mine.items() if part.rich_help_panel is None]
     groups = dict.fromkeys(part.rich_help_panel for part in mine.values() if part.rich_help_panel)
     usage = " ".join([*parts, *([f"[{' '.join(own)}]"] if own else []), *(f"[{name.lower()}]" for name in groups)])
     return f"| `{usage}` | {' '.join(command.help.split())} |"
+
+
+def _placeholder(part: Any) -> str:
+    word = part.metavar + ("..." if part.nargs == -1 else "")
+    return word if part.required else f"[{word}]"
 
 
 def table() -> str:

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from collections import defaultdict
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -301,3 +302,18 @@ def test_lost_readings_are_marked_and_readings_that_were_not_due_are_not(synthet
     # The window is 1 to 1.25 s, samples 20 000 to 25 000; a bin holds ten of the 40 000.
     assert index.tolist() == [*range(21_000, 21_500), *range(30_000, 33_000, 10)]
     assert not np.isnan(rows["/fusion/kalman/innovation_mems_gyro"][1]).any()
+
+
+def test_a_profile_below_the_resolution_draws_no_axes_of_its_own(tmp_path, recwarn):
+    """At standstill the fluid's velocity is arithmetic, 1e-90 rad/s: its scale would overflow single precision."""
+    from testbed.recording.channel import Channel
+
+    calls = []
+    recording = SimpleNamespace(static=lambda *args: calls.append(args), columns=lambda *_: None, stream=None)
+    channel = Channel.__new__(Channel)
+    channel._largest, channel._heights, channel._color = 1e-90, np.array([0.0, 1e-3]), "#2f86d6"
+    channel._recording, channel.entity = recording, "/sensors/mhd_ars/channel"
+    channel._batch = SimpleNamespace(flush=lambda: None)
+    channel.finish()
+    assert calls
+    assert not recwarn.list

@@ -6,6 +6,7 @@ import itertools
 import re
 from xml.etree import ElementTree as ET
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -134,13 +135,14 @@ def test_errors_figure_of_an_exact_filter_draws():
 
 
 def test_rates_figure_axes_have_units_and_the_zoom(digest: Digest):
-    above, below = rates_figure(digest, colors_of(digest)).axes
+    above, sensors, below = rates_figure(digest, colors_of(digest)).axes
+    assert sensors.get_xlim() == below.get_xlim()
     assert above.get_xlim() == (0.0, 2.0)
     assert below.get_xlim() == (1.0, 1.4)
     assert above.get_ylabel() == below.get_ylabel() == "rate [deg/s]"
     assert below.get_xlabel() == "time [s]"
     labels = [text.get_text() for text in below.figure.legends[0].get_texts()]
-    assert labels == ["commanded", "truth", "mhd_ars", "mems_gyro", "kalman", "shakf"]
+    assert labels == ["truth", "mhd_ars", "mems_gyro", "kalman", "shakf", "commanded"]
 
 
 def test_spectrum_figure_root_density_lines_and_floor(digest: Digest):
@@ -235,3 +237,27 @@ def test_a_narrow_logarithmic_axis_is_labelled_between_the_powers_of_ten(limits,
     labels = axes.get_yticklabels() + axes.get_yticklabels(minor=True)
     seen = {label.get_position()[1]: label.get_text() for label in labels if label.get_text()}
     assert [seen[y] for y in sorted(seen) if limits[0] * 0.999 <= y <= limits[1] * 1.001] == shown
+
+
+def test_rates_figure_hides_no_sensor_under_the_truth(digest: Digest):
+    """The truth is drawn over the sensors as two dashed edges: what lies beneath shows through."""
+    colors = colors_of(digest)
+    for axes in rates_figure(digest, colors).axes[:2]:
+        assert {mpl.colors.to_hex(patch.get_facecolor()[0]) for patch in axes.collections} == {
+            colors["sensors/mhd_ars"],
+            colors["sensors/mems_gyro"],
+        }
+        truth = [line for line in axes.lines if line.get_color() == colors["truth"]]
+        assert len(truth) == 2
+        assert all(line.get_linestyle() == "--" for line in truth)
+
+
+def test_figures_are_in_the_unit_that_is_asked_for(digest: Digest):
+    colors, slow = colors_of(digest), ("deg/h", 3600.0)
+    for draw in (rates_figure, errors_figure):
+        plain, scaled = draw(digest, colors).axes[0], draw(digest, colors, slow).axes[0]
+        assert "[deg/h]" in scaled.get_ylabel()
+        assert_allclose(scaled.get_ylim(), 3600.0 * np.array(plain.get_ylim()), rtol=1e-9)
+    spectra = [spectrum_figure(digest, colors, None, unit).axes[0] for unit in (("deg/s", 1.0), slow)]
+    assert "[deg/h/√Hz]" in spectra[1].get_ylabel()
+    assert_allclose(spectra[1].lines[0].get_ydata(), 3600.0 * spectra[0].lines[0].get_ydata(), rtol=1e-12)

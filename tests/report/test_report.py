@@ -157,7 +157,7 @@ def test_report_numbers_equal_metrics_json(run: Path, page: str):
                 assert text == "—" if value is None else as_number(text) == pytest.approx(value, rel=5e-3)
             for line in item["lines"]:
                 frequency = str(line["frequency_hz"])
-                assert cells[frequency, name, "gain"][0] == line["gain"]
+                assert cells[frequency, name, "gain"] == (line["gain"], significant(line["gain"], 4))
                 assert cells[frequency, name, "phase_deg"] == (line["phase_deg"], fixed(line["phase_deg"], 2))
     value, _ = cells["fusion", "kalman", "ratio"]
     assert value == 0.00234567 / 0.0011111
@@ -446,3 +446,42 @@ def test_report_memory_is_flat_in_duration(tmp_path: Path):
         tracemalloc.stop()
     # One signal of the long run alone is 24 MB; 5 % covers text that differs.
     assert peaks[1] < 1.05 * peaks[0]
+
+
+def test_a_slow_run_is_in_one_unit_and_of_one_sensor_in_its_words(tmp_path: Path):
+    """Every rate in deg/h, figure numbers in their order, no word of a second sensor or of a filter."""
+    metrics = metrics_of(3.0, 1.0, ())
+    metrics["sensors"] = {"mems_gyro": {"rmse_deg_s": 1e-4, "peak_error_deg_s": 3e-16, "lines": []}}
+    page = write_report(make_run(tmp_path / "run", metrics)).read_text(encoding="utf-8")
+    text = re.sub(r"<svg.*?</svg>|<pre.*?</pre>", "", page, flags=re.DOTALL)
+    assert "its error is 0.360 deg/h rms. No filter was run." in text
+    assert "deg/s" not in text.replace("rmse_deg_s", "")
+    assert "below 3.6×10⁻⁹" in text
+    for word in ("mhd", "MHD", "gyro</sub>", "other sensor", "filters wide", "claimed std", "best sensor"):
+        assert word not in text
+    assert re.findall(r"<b>Figure (\d+)\.</b>", page) == ["1", "2"]
+
+
+def test_the_set_up_names_presets_and_what_differs(tmp_path: Path):
+    metrics = metrics_of(0.2, 0.0, ("kalman",))
+    differs = [{"key": "angle_random_walk", "here": "0.3 deg/sqrt(h)", "preset": "0.15 deg/sqrt(h)"}]
+    metrics["setup"] = [
+        {"part": "sensors.mems_gyro", "preset": "adis16505_filtered", "differs": differs},
+        {"part": "fusion.kalman", "preset": None, "differs": []},
+    ]
+    page = write_report(make_run(tmp_path / "run", metrics)).read_text(encoding="utf-8")
+    assert "adis16505_filtered" in page
+    assert 'angle_random_walk&nbsp;= 0.3 deg/sqrt(h) <span class="none">(0.15 deg/sqrt(h))</span>' in page
+
+
+def test_gain_and_phase_are_shown_with_their_intervals(tmp_path: Path):
+    metrics = metrics_of(0.2, 0.0, ("kalman",))
+    metrics["fusion"]["kalman"]["lines"] = [
+        {"frequency_hz": 0.5, "gain": 0.19743, "gain_ci95": 0.0031, "phase_deg": 78.4, "phase_ci95_deg": 0.9},
+        {"frequency_hz": 208.0, "gain": 0.2, "gain_ci95": 0.5, "phase_deg": 12.0, "phase_ci95_deg": 180.0},
+    ]
+    page = write_report(make_run(tmp_path / "run", metrics)).read_text(encoding="utf-8")
+    cells = Tables(page).cells
+    assert cells["0.5", "kalman", "gain"] == (0.19743, "0.197± 0.003")
+    assert cells["208.0", "kalman", "gain"] == (0.2, "0.2± 0.5")
+    assert cells["208.0", "kalman", "phase_deg"] == (12.0, "lost")

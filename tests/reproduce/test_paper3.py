@@ -75,7 +75,7 @@ def test_the_original_has_the_coefficients_that_were_put_in(written):
 @pytest.mark.slow
 def test_what_filters_the_noise_gets_no_coefficient(written):
     _, _, rows = written
-    for name in ("Kalman filter (22)", "low-pass of 300 s"):
+    for name in (paper3.EQUATION_22, "low-pass of 300 s"):
         assert rows[name, "-"]["angle_random_walk_deg_sqrt_h"] == ""
     # Interpolated between lines at periods of 200 and 400 s.
     assert float(rows["low-pass of 300 s", "-"]["bandwidth_hz"]) == pytest.approx(1.0 / 300.0, rel=0.15, abs=0.0)
@@ -88,6 +88,10 @@ def test_the_papers_numbers_stand_beside_ours(written):
     assert rows[paper3.PIPELINE, "this record"]["paper_angle_random_walk_deg_sqrt_h"] == "7.211e-06"
     assert rows["original", "-"]["paper_bias_instability_deg_h"] == "0.015323"
     assert rows["OLMD-KPCA", ""]["seconds"] == ""
+    # The printed row is of the paper's reference 22, another filter than its equation (22).
+    assert rows["AKF [22]", ""]["paper_bias_instability_deg_h"] == "0.00054223"
+    assert rows["AKF [22]", ""]["seconds"] == ""
+    assert rows[paper3.EQUATION_22, "-"]["paper_bias_instability_deg_h"] == ""
     assert rows["OLMD-KPCA", ""]["paper_seconds"] == "1.98"
     assert sum("leak" in line for line in lines) >= 9
     assert len(list(out.glob("audit_*/audit.html"))) == 9

@@ -24,16 +24,21 @@ def inspect(
     source: Annotated[Path, typer.Argument(metavar="FILE", help="Recording of any format.")],
     output: Output,
     text: TextOptions,
+    map_: Annotated[
+        Path | None, typer.Option("--map", metavar="LOG.yaml", help="Map to read it by; default what its words say.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="LOG.yaml", help="Map to write; default none.")] = None,
 ) -> None:
     """Say what a recording holds, channel by channel, and propose the map that reads it."""
     from testbed.cli.recordings import document, print_reports
     from testbed.logs.formats import open_table
     from testbed.logs.inspection import inspect as look
-    from testbed.logs.proposal import propose, write_map
+    from testbed.logs.logmap import load_map
+    from testbed.logs.proposal import Proposal, propose, write_map
+    from testbed.logs.reader import plans_of
 
-    table = open_table(source, text)
-    proposed = propose(table)
+    proposed = propose(open_table(source, text)) if map_ is None else Proposal(plans_of(source, load_map(map_)), ())
+    table = proposed.plans[0].table
     reports = look(proposed.plans)
     if out is not None:
         write_map(out, source, proposed)

@@ -116,7 +116,7 @@ class ArwShakf(SageHusa):
     # is hardly touched.
     departs: ClassVar[Mapping[str, tuple[float, float]]] = {"nees": (0.5, 1.7), "nis_mems_gyro": (0.01, 0.3)}
     rows = Rows(SageHusa.rows.once, ("innovation", "innovation_variance", "R", "N", "band", "S"))
-    fault_leaves = 0.4 * DEG
+    fault_leaves = (0.4 * DEG, 0.1 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ArwShakfParameters

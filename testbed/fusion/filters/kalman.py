@@ -59,7 +59,7 @@ class Kalman(ModelFilter):
 
     Parameters: ClassVar[type[Part]] = KalmanParameters
     rows = Rows(per_sensor=("innovation", "innovation_variance"))
-    fault_leaves = 0.4 * DEG
+    fault_leaves = (0.4 * DEG, 0.1 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: KalmanParameters

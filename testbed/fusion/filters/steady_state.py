@@ -73,7 +73,7 @@ class SteadyState(BlockFilter):
     Parameters: ClassVar[type[Part]] = SteadyStateParameters
     rows = Rows(per_sensor=("innovation", "innovation_variance"))
     start_leaves = (0.0045 * DEG, 0.0045 * DEG)
-    fault_leaves = 0.4 * DEG
+    fault_leaves = (0.4 * DEG, 0.1 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters

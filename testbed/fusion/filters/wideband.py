@@ -87,7 +87,7 @@ class Wideband(ModelFilter):
 
     Parameters: ClassVar[type[Part]] = WidebandParameters
     rows = Rows(("log10_q",), ("innovation", "innovation_variance", "refused"))
-    fault_leaves = 0.4 * DEG
+    fault_leaves = (0.4 * DEG, 0.1 * DEG)
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: WidebandParameters

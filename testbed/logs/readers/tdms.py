@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def open_tdms(path: Path, kind: str) -> ArrayTable:
-    """Return the channels of a TDMS file, with the rate and start that a waveform states.
+    """Return the channels of a TDMS file, with the rate that a waveform states.
 
     Parameters
     ----------
@@ -58,9 +58,8 @@ def _part(channel: Any) -> Callable[[int, int], NDArray[Any]]:
 
 def _column(channel: Any, group: str) -> TableColumn:
     said = channel.properties
-    step, start = said.get("wf_increment"), said.get("wf_start_time")
+    step = said.get("wf_increment")
     unit = str(said.get("unit_string", said.get("NI_UnitDescription", "")))
     name = f"{group}/{channel.name}" if group else channel.name
     rate_hz = 1.0 / float(step) if step else None
-    start_ns = None if start is None else int(np.datetime64(start, "ns").astype(np.int64))
-    return TableColumn(name, unit, group, len(channel), rate_hz, start_ns)
+    return TableColumn(name, unit, group, len(channel), rate_hz)

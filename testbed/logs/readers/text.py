@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from testbed.logs.table import Block
 
 _BLOCK = 4 << 20
+# Of times: day before month, and a comma before the fraction of a second; not where commas are between fields.
+_DAY_FIRST = re.compile(rb"\b(\d\d)\.(\d\d)\.(\d{4})([T ]\d\d:)")
+_TIME_COMMA = re.compile(rb"(:\d\d),(\d)")
 # Digits after the point that stamps are exact to.
 _DIGITS = 9
 _MARKS = tuple(mark.encode() for mark in COMMENTS)
@@ -62,7 +65,10 @@ class TextTable:
         if not head.strip():
             raise refusal(path, "expected a column of numbers, got nothing")
         complete = path.stat().st_size <= len(head)
-        self.dialect: Dialect = find_dialect(path, head, complete=complete, options=options or TextOptions())
+        said = options or TextOptions()
+        self.dialect: Dialect = find_dialect(path, head, complete=complete, options=said)
+        self._nulls = [*_NULLS, said.missing] if said.missing else _NULLS
+        self.unreadable = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind == "text")
         self.format = f"text: {self.dialect}"
         self.header = self.dialect.preamble
         self.columns = self._columns()
@@ -130,6 +136,9 @@ class TextTable:
         # The search for a letter is quick; lines are looked at one by one only where there is one.
         if any(mark in raw for mark in _MARKS):
             raw = b"\n".join(row for row in raw.split(b"\n") if not row.lstrip().startswith(_MARKS))
+        if "iso" in self.dialect.kinds or "clock" in self.dialect.kinds:
+            raw = _DAY_FIRST.sub(rb"\3-\2-\1\4", raw)
+            raw = raw if self.dialect.separator == "," else _TIME_COMMA.sub(rb"\1.\2", raw)
         if self.dialect.separator == " ":
             raw = re.sub(rb"[ \t]+", b" ", raw.replace(b"\r\n", b"\n")).removeprefix(b" ")
             return raw.replace(b"\n ", b"\n").replace(b" \n", b"\n").removesuffix(b" ")
@@ -178,7 +187,7 @@ class TextTable:
                 column_types={str(i): kind for i, kind in types.items()},
                 include_columns=[str(i) for i in types],
                 decimal_point=dialect.decimal,
-                null_values=_NULLS,
+                null_values=self._nulls,
                 strings_can_be_null=True,
                 check_utf8=False,
             ),
@@ -216,7 +225,7 @@ class TextTable:
     def _refuse_field(self, field: str, index: int, kind: str, line: int) -> None:
         """Refuse a field that is not of its kind, a type of pyarrow by name."""
         label = repr(self.columns[index].name)
-        if field in _NULLS:
+        if field in self._nulls:
             return
         if kind.startswith("time"):
             if not (ISO if kind.startswith("timestamp") else CLOCK).fullmatch(field):
@@ -227,7 +236,7 @@ class TextTable:
         try:
             float(field.replace(",", ".") if self.dialect.decimal == "," else field)
         except ValueError:
-            remedy = "write a decimal point or give --decimal ," if "," in field else "fill it or cut the record"
+            remedy = "write a decimal point or give --decimal ," if "," in field else _remedy(field)
             self._refuse(f"expected a finite number in {label}, got {quoted(field)}; {remedy}", line)
         if kind == "int64" and not re.fullmatch(r"[+-]?\d+", field):
             self._refuse(
@@ -236,6 +245,10 @@ class TextTable:
 
     def _refuse(self, message: str, line: int | None = None) -> NoReturn:
         raise refusal(self.path, message, line=line)
+
+
+def _remedy(field: str) -> str:
+    return f"fill it, cut the record, or give --missing {field!r} if that means none"
 
 
 def _plain(column: Any) -> NDArray[Any]:

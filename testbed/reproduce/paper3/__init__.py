@@ -58,6 +58,7 @@ PROGRAMMES = {
 }
 # "Temperature" alone, as the paper has it, cannot describe a drift that depends on its slope: here it gets the slope
 # too.
+EQUATION_22 = "Kalman filter of equation (22)"
 WITH_SLOPE = "the same with slope"
 SLOPE = Features(degree=1, lags=())
 COLUMNS = (
@@ -151,9 +152,7 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
     one = [cycle("up first", 1000 + seed, fs).record]
     two = [*one, cycle("down first", 2000 + seed, fs).record]
     yield Case(ORIGINAL, "-", lambda record: record.rate)
-    yield Case(
-        "Kalman filter (22)", "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0]
-    )
+    yield Case(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
     yield Case("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         (PIPELINE, protocol.options),

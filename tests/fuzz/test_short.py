@@ -1,0 +1,43 @@
+"""The short form of the fuzz: some hundred cases of each kind, the same ones in every run."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.fuzz.cases import BASES, KINDS, case
+from tests.fuzz.play import play
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_case_raises_hangs_or_swells(tmp_path, kind):
+    for seed in range(150):
+        result = play(case(kind, seed), tmp_path / "case.yaml")
+        assert not result.fault, f"{kind} {seed}: {result.fault}"
+
+
+@pytest.mark.parametrize("base", range(len(BASES)))
+def test_what_is_mutated_is_valid(tmp_path, base):
+    assert play(BASES[base], tmp_path / "case.yaml").outcome == "accepted"
+
+
+def test_a_planted_fault_is_seen(tmp_path, monkeypatch):
+    """A check that raises, one that echoes its input, and one that takes too long."""
+    from testbed.errors import ScenarioError
+    from tests.fuzz import play as module
+
+    def raises(_path):
+        raise KeyError
+
+    def echoes(_path):
+        raise ScenarioError("got " + "x" * 200)
+
+    def sleeps(_path):
+        while True:
+            pass
+
+    for planted, outcome in ((raises, "raised"), (echoes, "refused"), (sleeps, "hung")):
+        monkeypatch.setattr(module, "check", planted)
+        result = play("name: a", tmp_path / "case.yaml", seconds=0.2)
+        assert result.outcome == outcome
+        assert result.fault
