@@ -111,7 +111,10 @@ def test_modules_are_small():
     lines = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in MODULES}
     assert statistics.median(lines.values()) <= 160
     # The cache of compiled kernels watches only the file of each kernel: what they call stands beside them.
-    assert {name for name, count in lines.items() if count > 450} == {"fusion/kernels/covariance.py"}
+    assert {name for name, count in lines.items() if count > 450} == {
+        "fusion/kernels/bank.py",
+        "fusion/kernels/covariance.py",
+    }
 
 
 @pytest.mark.contract

@@ -14,7 +14,7 @@ from testbed.pages.palette import color_of
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number, rate_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -50,6 +50,8 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for name, source in metrics.sensors.items():
         if source.missing:
             console.print(f"{name}: {source.missing} readings lost")
+    for words in _start_and_gates(metrics):
+        console.print(words, soft_wrap=True, highlight=False)
     _print_bounds(console, metrics, unit)
     _print_budget(console, metrics.budget, unit)
     _print_beliefs(console, metrics.fusion)
@@ -62,6 +64,16 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
         f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml, manifest.json",
         soft_wrap=True,
     )
+
+
+def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
+    """Yield what the filters knew of the start, and what their front part struck out."""
+    for start, words in (("rest", "knew that the table rests at t = 0"), ("unknown", "knew nothing of the start")):
+        if names := [name for name, source in metrics.fusion.items() if source.start == start]:
+            yield f"start: {', '.join(names)} {words}"
+    for name, source in metrics.fusion.items():
+        if gated := {sensor: n for sensor, n in (source.gated or {}).items() if n}:
+            yield f"{name}: struck out {', '.join(f'{n} readings of {sensor}' for sensor, n in gated.items())}"
 
 
 def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list[list[str]]]) -> None:

@@ -63,8 +63,8 @@ class FusionModel:
         Variance of a reading [rad^2/s^2].
     still : ndarray, shape (n_state,)
         The states in equilibrium with a unit constant rate [-].
-    n_core : int
-        Number of states of signal and sensors; those of slow noise follow.
+    n_slow : int
+        Number of states of slow noise, the last ones.
     owners : ndarray of int, shape (n_state,)
         The sensor that each state belongs to, -1 for the signal's.
     """
@@ -78,7 +78,7 @@ class FusionModel:
     R: FloatArray
     P0: FloatArray
     still: FloatArray
-    n_core: int
+    n_slow: int
     owners: NDArray[np.int64]
 
     @property
@@ -141,14 +141,13 @@ def build_model(
     believed = [belief[name] for name in sensors]
     A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
     owners = np.concatenate([np.full(order, -1), *(np.full(one.n_pole, i) for i, one in enumerate(believed))])
-    n_core = len(A)
     slow_variance = np.zeros(0)
     if coloured:
         A, Qc, H, owners, slow_variance = _with_slow_noise(believed, A, Qc, H, owners)
     F, Q = van_loan(A, Qc, 1.0 / fastest)
     R = np.array([one.output_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
     P0, still = _start(believed, A, Qc, order, slow_variance, start)
-    return FusionModel(sensors, fastest, strides, F, Q, H, R, P0, still, n_core, owners)
+    return FusionModel(sensors, fastest, strides, F, Q, H, R, P0, still, slow_variance.size, owners)
 
 
 def _with_slow_noise(

@@ -46,6 +46,7 @@ class Judge:
         self._errors = {name: ErrorMetrics(scenario.lines, gaps=True, span=span) for name in scenario.sensors}
         self._errors |= {name: ErrorMetrics(scenario.lines, span=span) for name in scenario.fusion}
         self._consistency = {name: Consistency() for name in scenario.fusion}
+        self._gated: dict[str, dict[str, int]] = {}
         self._table = TableMetrics(scenario, step)
 
     def write(self, block: RunBlock) -> None:
@@ -55,6 +56,7 @@ class Judge:
             self._add(name, block, readings, None)
         for name, estimate in block.fusion.items():
             error, settled = self._add(name, block, estimate.rate, estimate.std)
+            self._gated.setdefault(name, {}).update(_gated(estimate.diagnostics))
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
 
     def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> tuple[Any, int]:
@@ -89,6 +91,8 @@ class Judge:
         fusion = {
             name: {
                 "belief": declared(spec.belief),
+                "start": getattr(spec.parameters, "start", None),
+                "gated": self._gated.get(name),
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 **floors,
@@ -171,6 +175,12 @@ class Judge:
 def in_deg(rate: float | None) -> float | None:
     """Return a rate [rad/s] in deg/s, None for None."""
     return None if rate is None else float(np.rad2deg(rate))
+
+
+def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:
+    """Return how many readings of each sensor the front part of a filter has struck out so far."""
+    stem = "gated_"
+    return {key[len(stem) :]: int(n[-1]) for key, n in diagnostics.items() if key.startswith(stem) and n.size}
 
 
 def _floor_curve(psds: Mapping[str, Any], bandwidth: float) -> dict[str, list[float]]:

@@ -72,10 +72,13 @@ class ConsistencyMetrics(Entry):
 
 class SourceMetrics(Entry):
     """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
-    a filter's is from.
+    a filter's is from, `start` what it knew of its start, `gated` how many readings its front part struck out, by
+    sensor.
     """
 
     belief: str | None = None
+    start: str | None = None
+    gated: dict[str, int] | None = None
     rmse_deg_s: float | None = None
     rmse_aligned_deg_s: float | None = None
     peak_error_deg_s: float | None = None

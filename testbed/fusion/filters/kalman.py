@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import Rows
+from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model_filter import CovarianceParameters, ModelFilter, Variance
 from testbed.units import DEG
@@ -31,6 +31,7 @@ class KalmanParameters(CovarianceParameters):
 
     default_q: ClassVar[dict[int, float]] = {1: 0.3 * DEG**2, 2: 1e6 * DEG**2, 3: 1e10 * DEG**2}
 
+    coloured: Switch = True
     R: dict[str, Variance] = Field(default={})
 
 
@@ -68,7 +69,7 @@ class Kalman(ModelFilter):
         self._R = self.measurement_noise("R", parameters.R, explicit=True).astype(self._x.dtype)
         self._outside = np.zeros(self._R.size, dtype=np.int64)
         self._started = False
-        self._run = kalman_kernel(self._x.size, self._R.size, self._form)
+        self._run = kalman_kernel(self._x.size, self._R.size, self._form, self.model.n_slow)
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         progress = (self._outside, self._started)

@@ -70,7 +70,7 @@ class AdaptiveFilter(ModelFilter):
         self._chosen = np.zeros(self._x.size, dtype=np.bool_)
         self._progress = np.array([0.0, 1.0, 0.0])
         self._forget = 0.0
-        self._run = adaptive_kernel(self._x.size, n_sensor, self._form)
+        self._run = adaptive_kernel(self._x.size, n_sensor, self._form, self.model.n_slow)
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         state = (self._sensors, self._windows, self._chosen, self._progress, self._forget)

@@ -40,7 +40,7 @@ class SteadyStateParameters(CommonParameters):
 
     frequency: Frequency = 10.0
     amplitude: Range = math.radians(1.0)
-    coloured: Switch = False
+    coloured: Switch = True
 
 
 class SteadyState(BlockFilter):
@@ -99,7 +99,7 @@ class SteadyState(BlockFilter):
         )
         self._progress = np.zeros(COUNTS + n_sensor, dtype=np.int64)
         self._progress[EVERY] = round(_CHECK_EVERY * self.model.sample_rate_hz)
-        self._run = settling_kernel(n, n_sensor)
+        self._run = settling_kernel(n, n_sensor, self.model.n_slow)
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         model = self.model

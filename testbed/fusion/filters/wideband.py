@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from testbed.fusion.base import Rows
+from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import FormParameters, ModelFilter
@@ -47,6 +47,7 @@ class WidebandParameters(FormParameters):
 
     default_q: ClassVar[dict[int, float]] = {3: 1e4 * DEG**2}
 
+    coloured: Switch = True
     order: Annotated[int, Field(ge=1, le=3)] = 3
     decades: Annotated[float, Field(gt=0.0, le=30.0)] = 15.0
     filters: Annotated[int, Field(ge=2, le=32)] = 16
@@ -104,7 +105,7 @@ class Wideband(ModelFilter):
         forget = math.exp(-1.0 / (self.model.sample_rate_hz * parameters.memory))
         self._setting = np.array([0.0, forget, parameters.surprise, parameters.patience, parameters.restart])
         self._columns = _columns(self.model.F), _columns(self.model.H)
-        self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form)
+        self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form, self.model.n_slow)
 
     def _noise_of_bank(
         self,
@@ -130,7 +131,7 @@ class Wideband(ModelFilter):
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         model, (of_F, of_H) = self.model, self._columns
         mixing = (self._score, self._watch, self._setting, self._levels)
-        self._run(self._x, self._P, model.F, of_F, self._Q, model.H, of_H, self._R, Z, *mixing, out)
+        self._run(self._x, self._P, model.F, of_F, self._Q, model.Q, model.H, of_H, self._R, Z, *mixing, out)
 
 
 def _columns(matrix: FloatArray) -> np.ndarray:

@@ -16,7 +16,6 @@ import numpy as np
 from numba import njit
 
 from testbed.fusion.kernels.covariance import (
-    CONVENTIONAL,
     INNOVATION,
     INNOVATION_VARIANCE,
     JOSEPH,
@@ -33,15 +32,10 @@ LOST_VARIANCE = 1.0
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form):  # noqa: PLR0912  # pragma: no cover
-    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only; zeros of F are left out.
-
-    A filter that has lost the rate in a long gap stands still: P would outgrow what a reading can reduce in double
-    precision. In JOSEPH form one half of P is computed and copied, in CONVENTIONAL every element is computed for
-    itself.
+def predict_bank(x, P, F, nonzero, Q, work, moved, n, M):  # noqa: PLR0912  # pragma: no cover
+    """Set x = F x and P = F P F' + Q for M filters side by side that differ in Q only, every element computed for
+    itself; zeros of F are left out.
     """
-    for m in range(M):
-        lost[m] = P[0, 0, m] > LOST_VARIANCE
     for i in range(n):
         for m in range(M):
             moved[i, m] = 0.0
@@ -57,8 +51,8 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form):  # noqa: P
                     work[i, j, m] += factor * P[k, j, m]
     for i in range(n):
         for m in range(M):
-            x[i, m] = x[i, m] if lost[m] else moved[i, m]
-        for j in range(n if form == CONVENTIONAL else i + 1):
+            x[i, m] = moved[i, m]
+        for j in range(n):
             for m in range(M):
                 moved[i, m] = Q[i, j, m]
             for s in range(nonzero[j, n]):
@@ -67,9 +61,137 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form):  # noqa: P
                 for m in range(M):
                     moved[i, m] += factor * work[i, k, m]
             for m in range(M):
-                P[i, j, m] = P[i, j, m] if lost[m] else moved[i, m]
-                if form != CONVENTIONAL:
-                    P[j, i, m] = P[i, j, m]
+                P[i, j, m] = moved[i, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def find_lost(P, lost, n, M, form):  # pragma: no cover
+    """Set which filters have lost the rate in a long gap; return whether one has.
+
+    They are to stand still: P would outgrow what a reading can reduce in double precision.
+    """
+    some = False
+    for m in range(M):
+        variance = P[0, 0, m]
+        if form == SQUARE_ROOT:
+            variance *= variance
+            for k in range(1, n):
+                variance += P[0, k, m] * P[0, k, m]
+        lost[m] = variance > LOST_VARIANCE
+        some = some or lost[m]
+    return some
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def restore(x, P, x_before, P_before, lost, n, M):  # pragma: no cover
+    """Put the filters that are lost back to where they were."""
+    for m in range(M):
+        if lost[m]:
+            for i in range(n):
+                x[i, m] = x_before[i, m]
+                for j in range(n):
+                    P[i, j, m] = P_before[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def predict_half(x, P, F, nonzero, Q, shared, work, moved, n, core, M):  # noqa: PLR0912  # pragma: no cover
+    """Do what `predict_bank` does to the lower half of P, none of the filters being lost.
+
+    From `core` on F is diagonal and the noise the same for all, `shared` (n, n): those states need no sums.
+    """
+    for i in range(core):
+        for m in range(M):
+            moved[i, m] = 0.0
+            for j in range(n):
+                work[i, j, m] = 0.0
+        for s in range(nonzero[i, n]):
+            k = nonzero[i, s]
+            factor = F[i, k]
+            for m in range(M):
+                moved[i, m] += factor * x[k, m]
+            for j in range(k):
+                for m in range(M):
+                    work[i, j, m] += factor * P[k, j, m]
+            for j in range(k, n):
+                for m in range(M):
+                    work[i, j, m] += factor * P[j, k, m]
+    for i in range(core):
+        for m in range(M):
+            x[i, m] = moved[i, m]
+        for j in range(i + 1):
+            for m in range(M):
+                moved[i, m] = Q[i, j, m]
+            for s in range(nonzero[j, n]):
+                k = nonzero[j, s]
+                factor = F[j, k]
+                for m in range(M):
+                    moved[i, m] += factor * work[i, k, m]
+            for m in range(M):
+                P[i, j, m] = moved[i, m]
+    for i in range(core, n):
+        factor = F[i, i]
+        for m in range(M):
+            x[i, m] *= factor
+        for j in range(core):
+            for m in range(M):
+                P[i, j, m] = shared[i, j] + factor * work[j, i, m]
+        for j in range(core, i + 1):
+            both = factor * F[j, j]
+            for m in range(M):
+                P[i, j, m] = shared[i, j] + both * P[i, j, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def project_half(P, h, seen, g, n, M):  # pragma: no cover
+    """Set g = P h' of each of M filters from the lower half of P; `seen` lists where h is not zero."""
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = 0.0
+    for s in range(seen[n]):
+        k = seen[s]
+        factor = h[k]
+        for j in range(k):
+            for m in range(M):
+                g[j, m] += factor * P[k, j, m]
+        for j in range(k, n):
+            for m in range(M):
+                g[j, m] += factor * P[j, k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovate_half(x, P, h, seen, z, e, spread, g, n, M):  # pragma: no cover
+    """Do what `innovate_bank` does to the lower half of P."""
+    project_half(P, h, seen, g, n, M)
+    for m in range(M):
+        e[m] = z
+        spread[m] = 0.0
+    for s in range(seen[n]):
+        k = seen[s]
+        for m in range(M):
+            e[m] -= h[k] * x[k, m]
+            spread[m] += h[k] * g[k, m]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def update_half(x, P, h, seen, R, e, spread, g, K, n, core, M):  # pragma: no cover
+    """Do what `update` does to the lower half of P, behind (e, spread, g) of `innovate_half`."""
+    for m in range(M):
+        spread[m] = 1.0 / (spread[m] + R)
+    for j in range(n):
+        for m in range(M):
+            K[j, m] = g[j, m] * spread[m]
+            x[j, m] += K[j, m] * e[m]
+        for k in range(j + 1):
+            for m in range(M):
+                P[j, k, m] -= K[j, m] * g[k, m]
+    project_half(P, h, seen, g, n, M)
+    for j in range(n):
+        for m in range(M):
+            g[j, m] -= R * K[j, m]
+        # Among slow noise a reading changes so little that its rounding needs no second look.
+        for k in range(min(j + 1, core)):
+            for m in range(M):
+                P[j, k, m] -= g[j, m] * K[k, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -90,31 +212,6 @@ def innovate_bank(x, P, h, seen, z, e, spread, g, n, M):  # pragma: no cover
         for m in range(M):
             e[m] -= h[k] * x[k, m]
             spread[m] += h[k] * g[k, m]
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def update_bank(x, P, h, seen, R, e, spread, g, K, n, M):  # pragma: no cover
-    """Apply the reading behind (e, spread, g) of `innovate_bank` to M filters, in the Joseph form of `update`."""
-    for j in range(n):
-        for m in range(M):
-            K[j, m] = g[j, m] / (spread[m] + R)
-            x[j, m] += K[j, m] * e[m]
-    for j in range(n):
-        for k in range(n):
-            for m in range(M):
-                P[j, k, m] -= K[j, m] * g[k, m]
-    for j in range(n):
-        for m in range(M):
-            g[j, m] = -R * K[j, m]
-        for s in range(seen[n]):
-            k = seen[s]
-            for m in range(M):
-                g[j, m] += P[j, k, m] * h[k]
-    for j in range(n):
-        for k in range(j + 1):
-            for m in range(M):
-                P[j, k, m] -= g[j, m] * K[k, m]
-                P[k, j, m] = P[j, k, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -173,15 +270,8 @@ def triangularise_bank(A, n, width, scale, total, M):  # noqa: PLR0912  # pragma
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict_root_bank(x, D, F, nonzero, S, array, moved, scale, total, lost, n, M):  # noqa: PLR0912  # pragma: no cover
+def predict_root_bank(x, D, F, nonzero, S, array, moved, scale, total, n, M):  # pragma: no cover
     """Do what `predict_bank` does to roots, by the QR of [F D, S]'; S is lower triangular."""
-    for m in range(M):
-        total[m] = 0.0
-    for k in range(n):
-        for m in range(M):
-            total[m] += D[0, k, m] * D[0, k, m]
-    for m in range(M):
-        lost[m] = total[m] > LOST_VARIANCE
     for i in range(n):
         for m in range(M):
             moved[i, m] = 0.0
@@ -200,10 +290,10 @@ def predict_root_bank(x, D, F, nonzero, S, array, moved, scale, total, lost, n, 
     triangularise_bank(array, n, n + 1, scale, total, M)
     for i in range(n):
         for m in range(M):
-            x[i, m] = x[i, m] if lost[m] else moved[i, m]
+            x[i, m] = moved[i, m]
         for j in range(n):
             for m in range(M):
-                D[i, j, m] = D[i, j, m] if lost[m] else array[i, j, m]
+                D[i, j, m] = array[i, j, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -315,21 +405,24 @@ def start_again(x, P, score, restart, n, M):  # pragma: no cover
 
 
 @functools.lru_cache
-def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, nonzero, Q, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman filters
-    over a block.
+def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
+    """Return run(x, P, F, nonzero, Q, shared, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman
+    filters over a block.
 
     They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots.
+    In JOSEPH form only the lower half of P is kept, and for the last `n_slow` states Q is `shared` (n, n).
     `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the columns of F and H that are not zero, their number last.
     `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 2) as in `admit`, `setting` = [started,
     forget, gate, patience, restart], `levels` (M,) what the weights average into the row LEVEL.
     """
+    core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, nonzero, Q_in, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, nonzero, Q_in, shared, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))
+        x_before, P_before = np.empty((n, M)), np.empty((n, n, M))
         e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
         used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
@@ -337,11 +430,18 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
         weigh(score, weight, M)
         for k in range(Z.shape[1]):
             if setting[0] > 0.0:
+                some = find_lost(P, lost, n, M, form)
+                if some:
+                    x_before[:], P_before[:] = x, P
                 if form == SQUARE_ROOT:
-                    predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, lost, n, M)
+                    predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, n, M)
+                elif form == JOSEPH:
+                    predict_half(x, P, F, nonzero, Q, shared, work, moved, n, core, M)
                 else:
-                    predict_bank(x, P, F, nonzero, Q, work, moved, lost, n, M, form)
-            informed = False
+                    predict_bank(x, P, F, nonzero, Q, work, moved, n, M)
+                if some:
+                    restore(x, P, x_before, P_before, lost, n, M)
+            informed, fresh = False, -1
             for i in range(n_sensor):
                 row = BANK_HEADER_ROWS + BANK_ROWS * i
                 out[row + INNOVATION, k] = np.nan
@@ -350,8 +450,11 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
                 if np.isfinite(Z[i, k]):
                     if form == SQUARE_ROOT:
                         innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    elif form == JOSEPH:
+                        innovate_half(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
                     else:
                         innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                    fresh = i
                     mean = 0.0
                     for m in range(M):
                         mean += weight[m] * e[m]
@@ -369,16 +472,21 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH) -> Any:  # no
                     score[m] *= forget
                 for i in range(n_sensor):
                     if used[i]:
-                        if form == SQUARE_ROOT:
-                            innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
-                        else:
-                            innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        # What the gate looked at last is still so, unless a reading was used since.
+                        if fresh != i:
+                            if form == SQUARE_ROOT:
+                                innovate_root_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                            elif form == JOSEPH:
+                                innovate_half(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                            else:
+                                innovate_bank(x, P, H[i], seen[i], Z[i, k], e, spread, g, n, M)
+                        fresh = -1
                         for m in range(M):
                             score[m] += log_likelihood(e[m], spread[m] + R[i], gate)
                         if form == SQUARE_ROOT:
                             update_root_bank(x, P, R[i], e, spread, g, total, n, M)
                         elif form == JOSEPH:
-                            update_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
+                            update_half(x, P, H[i], seen[i], R[i], e, spread, g, K, n, core, M)
                         else:
                             update_plain_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
                 weigh(score, weight, M)

@@ -1,9 +1,10 @@
 """The compiled steps of the filters with one covariance, for sizes known to the compiler.
 
 `kalman_kernel`, `settling_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
-sensors): loops of constant length unroll. They close over integers only, which numba's disk cache keys by value, so
-that a second process loads and does not compile. That cache watches no other file than the kernel's own: what calls
-each other stays in one file, which is why this one is long. `testbed.fusion.kernels.bank` and
+sensors): loops of constant length unroll. The last `n_slow` states are those of slow noise: each moves by itself and
+enters the others, which in Joseph form is made use of. They close over integers only, which numba's disk cache keys by
+value, so that a second process loads and does not compile. That cache watches no other file than the kernel's own: what
+calls each other stays in one file, which is why this one is long. `testbed.fusion.kernels.bank` and
 `testbed.fusion.two_paths.kernel` share numbers with it but no code; who changes such a number touches those files too.
 
 The arrays handed in decide the precision: in single precision no sum of the state and covariance recursion is formed in
@@ -79,53 +80,94 @@ SENSOR = np.dtype(
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def move(x, F, moved, n):  # pragma: no cover
-    """Set x = F x."""
-    for i in range(n):
+def spans(A, first, stop, reach):  # pragma: no cover
+    """Set reach[i] = the columns from `first` to before `stop` between which row i of A is not zero."""
+    for i in range(A.shape[0]):
+        low, high = stop, first
+        for j in range(first, stop):
+            if A[i, j] != 0.0:
+                low, high = min(low, j), j + 1
+        reach[i, 0], reach[i, 1] = (low, high) if low < high else (first, first)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def move(x, F, reach, moved, n, core):  # pragma: no cover
+    """Set x = F x; from `core` on F is diagonal, and reach[i] says which of those states enter row i."""
+    for i in range(core):
         total = x.dtype.type(0.0)
-        for j in range(n):
+        for j in range(core):
+            total += F[i, j] * x[j]
+        for j in range(reach[i, 0], reach[i, 1]):
             total += F[i, j] * x[j]
         moved[i] = total
-    for i in range(n):
+    for i in range(core):
         x[i] = moved[i]
+    for i in range(core, n):
+        x[i] *= F[i, i]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def predict(x, P, F, Q, work, moved, n):  # pragma: no cover
+def predict(x, P, F, Q, reach, work, moved, n, core):  # pragma: no cover
     """Set x = F x and P = F P F' + Q, exactly symmetric."""
-    move(x, F, moved, n)
-    grow(P, F, Q, work, n)
+    move(x, F, reach, moved, n, core)
+    grow(P, F, Q, reach, work, n, core)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def grow(P, F, Q, work, n):  # pragma: no cover
-    """Set P = F P F' + Q, exactly symmetric."""
-    for i in range(n):
+def grow(P, F, Q, reach, work, n, core):  # noqa: PLR0912  # pragma: no cover
+    """Set P = F P F' + Q, exactly symmetric; from `core` on F is diagonal, as in `move`."""
+    for i in range(core):
         for j in range(n):
             work[i, j] = F[i, 0] * P[0, j]
-        for k in range(1, n):
+        for k in range(1, core):
             factor = F[i, k]
             for j in range(n):
                 work[i, j] += factor * P[k, j]
-    for i in range(n):
+        for k in range(reach[i, 0], reach[i, 1]):
+            factor = F[i, k]
+            for j in range(n):
+                work[i, j] += factor * P[k, j]
+    for i in range(core):
         for j in range(i + 1):
             total = Q[i, j]
-            for k in range(n):
+            for k in range(core):
                 total += work[i, k] * F[j, k]
+            for k in range(reach[j, 0], reach[j, 1]):
+                total += work[i, k] * F[j, k]
+            P[i, j] = total
+            P[j, i] = total
+        for j in range(core, n):
+            total = Q[i, j] + work[i, j] * F[j, j]
+            P[i, j] = total
+            P[j, i] = total
+    for i in range(core, n):
+        for j in range(core, i + 1):
+            total = Q[i, j] + F[i, i] * P[i, j] * F[j, j]
             P[i, j] = total
             P[j, i] = total
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def innovation(x, P, H, i, z, n):  # pragma: no cover
-    """Return (z - H_i x, H_i P H_i')."""
-    e, spread = z, x.dtype.type(0.0)
+def project(P, H, seen, i, g, n, core):  # pragma: no cover
+    """Set g = P H_i', P symmetric; seen[i] are the columns of H_i before `core` and behind it that are not zero."""
     for j in range(n):
-        total = x.dtype.type(0.0)
-        for k in range(n):
-            total += P[j, k] * H[i, k]
-        e -= H[i, j] * x[j]
-        spread += H[i, j] * total
+        g[j] = P.dtype.type(0.0)
+    for part in range(2):
+        for k in range(seen[i, 2 * part], seen[i, 2 * part + 1]):
+            factor = H[i, k]
+            for j in range(n):
+                g[j] += factor * P[k, j]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def innovation(x, P, H, seen, i, z, g, n, core):  # pragma: no cover
+    """Return (z - H_i x, H_i P H_i'); `seen` as in `project`, whose g is left behind."""
+    project(P, H, seen, i, g, n, core)
+    e, spread = z, x.dtype.type(0.0)
+    for part in range(2):
+        for k in range(seen[i, 2 * part], seen[i, 2 * part + 1]):
+            e -= H[i, k] * x[k]
+            spread += H[i, k] * g[k]
     return e, spread
 
 
@@ -138,41 +180,47 @@ def outside_gate(count, e, C):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def update(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+def update(x, P, H, seen, i, z, R, g, K, n, core):  # pragma: no cover
     """Apply one scalar reading in Joseph form, P = (I - K h)P(I - K h)' + K R K', its factors applied one after the
     other.
     """
-    e, C = z, R
-    for j in range(n):
-        total = x.dtype.type(0.0)
-        for k in range(n):
-            total += P[j, k] * H[i, k]
-        g[j] = total
-    for j in range(n):
-        e -= H[i, j] * x[j]
-        C += H[i, j] * g[j]
+    e, C = innovation(x, P, H, seen, i, z, g, n, core)
+    C += R
     for j in range(n):
         K[j] = g[j] / C
         x[j] += K[j] * e
     for j in range(n):
+        factor = K[j]
         for k in range(n):
-            P[j, k] -= K[j] * g[k]
+            P[j, k] -= factor * g[k]
+    # The column P h' - R K, by rows; what the first factor left unsymmetric is rounding.
+    project(P, H, seen, i, g, n, core)
     for j in range(n):
-        total = -R * K[j]
-        for k in range(n):
-            total += P[j, k] * H[i, k]
-        g[j] = total
+        g[j] -= R * K[j]
     for j in range(n):
+        factor = g[j]
         for k in range(j + 1):
-            total = P[j, k] - g[j] * K[k]
+            total = P[j, k] - factor * K[k]
             P[j, k] = total
             P[k, j] = total
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
+def move_whole(x, F, moved, n):  # pragma: no cover
+    """Set x = F x for any F."""
+    for i in range(n):
+        total = x.dtype.type(0.0)
+        for j in range(n):
+            total += F[i, j] * x[j]
+        moved[i] = total
+    for i in range(n):
+        x[i] = moved[i]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
 def predict_plain(x, P, F, Q, work, moved, n):  # pragma: no cover
     """Set x = F x and P = F P F' + Q, every element computed for itself."""
-    move(x, F, moved, n)
+    move_whole(x, F, moved, n)
     for i in range(n):
         for j in range(n):
             total = x.dtype.type(0.0)
@@ -188,17 +236,21 @@ def predict_plain(x, P, F, Q, work, moved, n):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def update_plain(x, P, H, i, z, R, g, K, n):  # pragma: no cover
+def update_plain(x, P, H, seen, i, z, R, g, K, n, core):  # pragma: no cover
     """Apply one scalar reading in the short form P = P - K h P, whose rounding can cost P its symmetry and its positive
     eigenvalues.
     """
-    e, C = innovation(x, P, H, i, z, n)
-    C += R
+    e, C = z, R
     for j in range(n):
         total = x.dtype.type(0.0)
         for k in range(n):
             total += P[j, k] * H[i, k]
-        K[j] = total / C
+        K[j] = total
+    for j in range(n):
+        e -= H[i, j] * x[j]
+        C += H[i, j] * K[j]
+    for j in range(n):
+        K[j] /= C
     for k in range(n):
         total = x.dtype.type(0.0)
         for j in range(n):
@@ -245,7 +297,7 @@ def triangularise(A, n, width):  # pragma: no cover
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_root(x, D, F, S, array, moved, n):  # pragma: no cover
     """Set x = F x and D D' = F D (F D)' + S S' by the QR of [F D, S]'; S is lower triangular."""
-    move(x, F, moved, n)
+    move_whole(x, F, moved, n)
     for i in range(n):
         for j in range(n):
             array[i, j] = F[i, 0] * D[0, j]
@@ -362,16 +414,17 @@ def row_square(D, j, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
 
     x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is
     (n_sensor, n_time); `outside` (n_sensor,) counts as in `outside_gate`; `out` (HEADER_ROWS + INNOVATION_ROWS *
     n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
     """
+    core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
@@ -381,12 +434,16 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PL
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
+        spans(F, core, n, reach)
+        spans(H, 0, core, seen[:, :2])
+        spans(H, core, n, seen[:, 2:])
         for k in range(Z.shape[1]):
             if started:
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
                 elif form == JOSEPH:
-                    predict(x, P, F, Q, work, moved, n)
+                    predict(x, P, F, Q, reach, work, moved, n, core)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False
@@ -400,7 +457,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PL
                     if form == SQUARE_ROOT:
                         e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
                     else:
-                        e[i], spread = innovation(x, P, H, i, kind.type(Z[i, k]), n)
+                        e[i], spread = innovation(x, P, H, seen, i, kind.type(Z[i, k]), g, n, core)
                     outside[i] = outside_gate(outside[i], e[i], spread + R[i])
                     if 0 < outside[i] <= PATIENCE:
                         due[i], e[i] = False, kind.type(0.0)
@@ -422,9 +479,9 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PL
                 for i in range(n_sensor):
                     if due[i]:
                         if form == JOSEPH:
-                            update(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                            update(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
                         else:
-                            update_plain(x, P, H, i, kind.type(Z[i, k]), R[i], g, K, n)
+                            update_plain(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
                 out[RATE, k] = x[0]
                 out[STD, k] = np.sqrt(P[0, 0])
         x_in[:], P_in[:] = x, P
@@ -445,7 +502,7 @@ def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
 
 
 @functools.lru_cache
-def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
+def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, R, Z, cycle, progress, out), the Kalman filter until its gains have settled, then with
     those.
 
@@ -455,6 +512,7 @@ def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
     steps of the cycle kept, steps between checks], then one count per sensor as in `outside_gate`. A reading that is
     due and missing ends the settled state: the recursion goes on from its covariance. `out` as in `kalman_kernel`.
     """
+    core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, Q_in, H_in, R, Z, cycle, progress, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
@@ -463,11 +521,15 @@ def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
         H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
         K, C_settled, settled, before = cycle
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
+        spans(F, core, n, reach)
+        spans(H, 0, core, seen[:, :2])
+        spans(H, core, n, seen[:, 2:])
         now = np.zeros((n, n_sensor))
         for k in range(Z.shape[1]):
             step = progress[STEP]
             if progress[STARTED] > 0:
-                move(x, F, moved, n)
+                move(x, F, reach, moved, n, core)
             if progress[MODE] == SETTLED:
                 whole = True
                 for i in range(n_sensor):
@@ -481,11 +543,11 @@ def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
             read = progress[MODE] == SETTLED
             if progress[MODE] != SETTLED:
                 if progress[STARTED] > 0:
-                    grow(P, F, Q, work, n)
+                    grow(P, F, Q, reach, work, n, core)
                 for i in range(n_sensor):
                     e[i] = np.nan
                     if np.isfinite(Z[i, k]):
-                        e[i], spread = innovation(x, P, H, i, Z[i, k], n)
+                        e[i], spread = innovation(x, P, H, seen, i, Z[i, k], g, n, core)
                         C[i] = spread + R[i]
                         progress[COUNTS + i] = outside_gate(progress[COUNTS + i], e[i], C[i])
                         if 0 < progress[COUNTS + i] <= PATIENCE:
@@ -509,7 +571,7 @@ def settling_kernel(n: int, n_sensor: int) -> Any:  # noqa: PLR0915
                     for j in range(n):
                         x[j] += K[step, j, i] * left
                 else:
-                    update(x, P, H, i, Z[i, k], R[i], g, gain, n)
+                    update(x, P, H, seen, i, Z[i, k], R[i], g, gain, n, core)
                     for j in range(n):
                         now[j, i] = gain[j]
             if read:
@@ -663,7 +725,7 @@ def adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n):  # pragma: no cover
 
 
 @functools.lru_cache
-def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: PLR0915
+def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
 
     As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of
@@ -671,6 +733,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
     `progress` = [started, beta^k, guard hits of Q]. What the adaptation remembers is in double precision whatever the
     arrays are.
     """
+    core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
@@ -684,6 +747,10 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array = np.empty((n, 2 * n), kind)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
+        spans(F, core, n, reach)
+        spans(H, 0, core, seen[:, :2])
+        spans(H, core, n, seen[:, 2:])
         adapts_Q = chosen.any()
         for k in range(Z.shape[1]):
             predicted = progress[0] > 0.0
@@ -691,7 +758,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
                 elif form == JOSEPH:
-                    predict(x, P, F, Q, work, moved, n)
+                    predict(x, P, F, Q, reach, work, moved, n, core)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False
@@ -707,7 +774,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 if form == SQUARE_ROOT:
                     e[i], spread[i] = innovation_root(x, P, H, i, z, n)
                 else:
-                    e[i], spread[i] = innovation(x, P, H, i, z, n)
+                    e[i], spread[i] = innovation(x, P, H, seen, i, z, g, n, core)
                 sensors[i].outside = outside_gate(sensors[i].outside, e[i], spread[i] + sensors[i].R)
                 if 0 < sensors[i].outside <= PATIENCE:
                     due[i], e[i] = False, kind.type(0.0)
@@ -728,9 +795,9 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH) -> Any:  # noqa: 
                 if due[i]:
                     z = kind.type(Z[i, k] - sensors[i].offset)
                     if form == JOSEPH:
-                        update(x, P, H, i, z, R[i], g, K, n)
+                        update(x, P, H, seen, i, z, R[i], g, K, n, core)
                     elif form == CONVENTIONAL:
-                        update_plain(x, P, H, i, z, R[i], g, K, n)
+                        update_plain(x, P, H, seen, i, z, R[i], g, K, n, core)
                     learn(sensors[i], e[i], square[i], spread[i])
                 elif not np.isnan(Z[i, k]):
                     sensors[i].previous_innovation = np.nan

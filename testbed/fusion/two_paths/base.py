@@ -3,35 +3,42 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
-from testbed.fusion.kernels.covariance import GATE, PATIENCE
 from testbed.fusion.model import build_model
+from testbed.fusion.start import REST_STD, constant_response, unknown_spread
 from testbed.fusion.two_paths.design import (
+    BAND_ORDER,
     HIGH_HZ,
     LOW_HZ,
-    Paths,
     band_end,
     best_crossover,
     input_psd,
+    inverted,
     low_pass,
+    parallel,
     without_far_zeros,
+    zeros_at_dc,
 )
-from testbed.fusion.two_paths.kernel import MEMORY_ROWS, two_paths
-from testbed.fusion.two_paths.noise import noise_variance
+from testbed.fusion.two_paths.kernel import LEAN, MEMORY_ENTRIES, VARIANCE, two_paths
+from testbed.fusion.two_paths.noise import alone_variance, noise_variance, slow_variance
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from testbed.fusion.belief import SensorBelief
+    from testbed.fusion.belief import Realisation, SensorBelief
     from testbed.fusion.model import FusionModel
     from testbed.parts import Part
     from testbed.signals import FloatArray
+
+# Modes of the slow path slower than this [rad/s] keep what they got wrong at the start, of a sine of this frequency.
+_SLOW_MODES, _ALTERNATING_HZ = 3.0, 0.5
 
 
 class TwoPathParameters(CommonParameters):
@@ -54,13 +61,21 @@ class TwoPathParameters(CommonParameters):
 
 
 class TwoPaths(BlockFilter):
-    r"""A fast and a slow sensor through fixed paths, parameters derived from the belief's noise.
+    r"""A fast and a slow sensor through inverses of their own, and a loop between them.
 
-    The bandwidth is the one with the least error for the sine named, noise and lag A |1 - L| / sqrt(2). The claimed
-    variance is that error: the noise part from the covariance of sensors and filter together (periodic, exact), the lag
-    at its mean. While the fast sensor is missing the rate stays and the variance grows as such a sine departs from its
-    value; while the slow one is missing its drift is added. A spike counts as missing, by the gate of the other
-    filters.
+    .. math:: \hat\omega = B\, z_{fast} / G_{fast} + u, \quad \dot u = k e + c, \quad \dot c = k_i e, \quad
+        e = B\, z_{slow} / G_{slow} - \hat\omega
+
+    Settled k is w_c (times :math:`\sqrt 2` with :math:`k_i = w_c^2` for order 2): the sum of a low-pass of the slow
+    path and the matching high-pass of the fast one. From an unknown start, and after each loss, k follows the scalar
+    Riccati equation, :math:`w' = w_c^2 - w^2`, which is w coth(w t): the slow path's mean at first, the loop later.
+    From a known rest it is w tanh(w t).
+
+    The bandwidth is the one with the least error for the sine named, noise and lag A |1 - B| / sqrt(2). The claimed
+    variance is that error, the noise part from the covariance of sensors and filter together (periodic, exact), slow
+    noise by its density, and what the loop has not settled yet. While the fast sensor is missing the variance grows as
+    such a sine departs from its value, until the slow path alone is better and is followed. While the slow one is
+    missing the fast one is integrated and its drift added.
 
     Parameters
     ----------
@@ -74,12 +89,14 @@ class TwoPaths(BlockFilter):
     Raises
     ------
     ValueError
-        If there are not two sensors, the faster one is not the better one at high frequency, or the sensors cannot be
-        joined this way.
+        If there are not two sensors, the faster one is not the better one at high frequency, the slower one sees no
+        constant rate, or the sensors cannot be joined this way.
     """
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
     needs_both = True
+    # Of the low-pass L at the crossover.
+    order: ClassVar[int]
     start_leaves = (math.radians(0.05), math.radians(0.1))
 
     def __init__(
@@ -91,58 +108,65 @@ class TwoPaths(BlockFilter):
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         clock = 2.0 * math.pi * self.model.sample_rate_hz
         slow, fast = (without_far_zeros(belief[self.model.sensors[i]], clock) for i in (self._slow, self._fast))
-        order = self.order(fast)
+        order = self.order
+        if zeros_at_dc(fast) > 1:
+            msg = f"belief: expected at most one zero at s = 0 for the fast sensor, got {zeros_at_dc(fast)}"
+            raise ValueError(msg)
         self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
+        crossover = 2.0 * math.pi * self.crossover_hz
         power = parameters.amplitude**2 / 2.0
 
-        def candidate(bandwidth_hz: float) -> tuple[Paths, FloatArray]:
+        def candidate(bandwidth_hz: float) -> FloatArray:
             band = band_end(slow, fast, 2.0 * math.pi * bandwidth_hz)
-            paths = self.paths(slow, fast, 2.0 * math.pi * self.crossover_hz, band)
             lag = power * abs(_band_error(band, parameters.frequency)) ** 2
-            return paths, lag + noise_variance(paths, self.model, self._slow, self._fast)
+            paths = parallel(slow, fast, order, crossover, band)
+            return lag + noise_variance(paths, self.model, self._slow, self._fast)
 
         self.bandwidth_hz = parameters.bandwidth or _best_bandwidth(candidate, self.model.sample_rate_hz)
-        paths, settled = candidate(self.bandwidth_hz)
+        self._settled = candidate(self.bandwidth_hz) + slow_variance(slow, fast, order, crossover)
+        band = band_end(slow, fast, 2.0 * math.pi * self.bandwidth_hz)
         T = 1.0 / self.model.sample_rate_hz
-        slowest = np.min(-np.roots(low_pass(order, 2.0 * math.pi * self.crossover_hz)[1]).real)
-        low = np.array([1e-3 * self.crossover_hz])
-        drift = float((2.0 * math.pi * low[0]) ** 2 * input_psd(fast)(low)[0])
-        forgotten = math.sqrt(drift) / fast.output_noise
-        patience = 2 * self.model.strides[self._slow]
-        setting = (paths.innovate, T, 2.0 * math.pi * parameters.frequency, power, forgotten, drift)
-        gate = (GATE**2, PATIENCE, self.model.R[self._fast], self.model.R[self._slow])
-        self._setting = np.array([*setting, math.exp(-2.0 * slowest * T), patience, *gate])
-        self._x, self._memory = np.zeros(len(paths.A)), np.zeros(MEMORY_ROWS)
-        self._matrices = (*paths.discrete(T), paths.C, paths.D, paths.H, paths.J, settled)
-
-    def order(self, fast: SensorBelief) -> int:
-        """Return the order of the low-pass L at the crossover [-].
-
-        Parameters
-        ----------
-        fast : SensorBelief
-            The sensor that is better at high frequency.
-        """
-        raise NotImplementedError
-
-    def paths(
-        self, slow: SensorBelief, fast: SensorBelief, crossover: float, band: tuple[FloatArray, FloatArray]
-    ) -> Paths:
-        """Return the paths for a crossover and a band end.
-
-        Parameters
-        ----------
-        slow, fast : SensorBelief
-            The sensor that is better at low frequency, and the other.
-        crossover : float
-            [rad/s].
-        band : tuple of ndarray, shapes (n_num,), (n_den,)
-            Numerator and denominator of B in s.
-        """
-        raise NotImplementedError
+        slow_rate_hz = self.model.sample_rate_hz / self.model.strides[self._slow]
+        alone_band, alone = _best_alone(slow, slow_rate_hz, parameters.frequency, power)
+        self._paths = tuple(_stepped(inverted(*one), T) for one in ((fast, band), (slow, alone_band)))
+        self._x = tuple(np.zeros(path[0].shape[0]) for path in self._paths)
+        rest = parameters.start == "rest"
+        spread = unknown_spread([belief[name] for name in self.model.sensors])
+        unknown = spread.constant**2 + spread.alternating**2
+        density = float(input_psd(slow)(np.array([self.crossover_hz]))[0])
+        lean, slowest = _lean(slow, self._paths[1], inverted(slow, alone_band))
+        self._setting = np.array(
+            [
+                T,
+                crossover,
+                crossover**2 if order == 2 else 0.0,
+                math.sqrt(order),
+                density,
+                alone,
+                2.0 * math.pi * parameters.frequency,
+                power,
+                2.0 * self.model.strides[self._slow],
+                parameters.rest_rate if rest else math.nan,
+                math.exp(-slowest * T),
+                _drift(fast, 1e-3 * self.crossover_hz),
+            ]
+        )
+        self._memory = np.zeros(MEMORY_ENTRIES)
+        self._memory[VARIANCE] = REST_STD**2 if rest else unknown
+        self._memory[LEAN] = 0.0 if rest else lean * spread.alternating
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
-        two_paths(self._x, self._memory, *self._matrices, self._setting, Z[self._fast], Z[self._slow], out)
+        two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
+
+
+def _stepped(path: Realisation, T: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
+    """Return (Phi, Gamma, ramp, C, D, still) of a path over a step T [s], exact for an input linear between samples."""
+    n = path.B.size
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n], block[n, n + 1] = path.A * T, path.B * T, 1.0
+    power = expm(block)
+    still = constant_response(path.A, path.B)
+    return power[:n, :n].copy(), power[:n, n].copy(), power[:n, n + 1].copy(), path.C, path.D, still
 
 
 def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int, int]:
@@ -152,6 +176,12 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     ends = np.array([input_psd(belief[name])(np.array([LOW_HZ, HIGH_HZ])) for name in model.sensors])
     slow = int(np.argmin(ends[:, 0]))
     fast = 1 - slow
+    if not belief[model.sensors[slow]].sees_constant:
+        msg = (
+            f"belief: expected {model.sensors[slow]!r}, the quieter sensor at low frequency, to see a constant rate; "
+            "without that the error grows without bound"
+        )
+        raise ValueError(msg)
     name = model.sensors[fast]
     if ends[fast, 1] > ends[slow, 1] or model.strides[fast] != 1 or belief[name].output_noise == 0.0:
         msg = (
@@ -168,11 +198,50 @@ def _band_error(band: tuple[FloatArray, FloatArray], freq_hz: float) -> complex:
     return complex(1.0 - np.polyval(band[0], s) / np.polyval(band[1], s))
 
 
-def _best_bandwidth(candidate: Callable[[float], tuple[Paths, FloatArray]], sample_rate_hz: float) -> float:
+def _drift(fast: SensorBelief, freq_hz: float) -> float:
+    """Return the density of the white noise whose integral the fast path's noise is at low frequency [rad^2/s^3]."""
+    response = abs(fast.realisation().response(np.array([freq_hz]))[0])
+    return float((2.0 * math.pi * freq_hz * fast.output_noise / response) ** 2)
+
+
+def _lean(slow: SensorBelief, path: tuple[Any, ...], inverse: Realisation) -> tuple[float, float]:
+    """Return how much of a rate that alternates at the start ends in the slow modes of the slow path [-], which stand
+    in equilibrium with its first reading, and how fast that decays [1/s].
+    """
+    rate = -np.diag(inverse.A)
+    modes = (rate > 0.0) & (rate < _SLOW_MODES)
+    reading = abs(slow.realisation().response(np.array([_ALTERNATING_HZ]))[0])
+    share = float(np.abs(path[3] * path[5])[modes].sum() * reading)
+    return share, float(rate[modes].min()) if modes.any() else 1.0
+
+
+def _best_alone(
+    slow: SensorBelief, sample_rate_hz: float, freq_hz: float, power: float
+) -> tuple[tuple[FloatArray, FloatArray], float]:
+    """Return the band end with which the slow sensor alone errs least for a sine, and that error [rad^2/s^2].
+
+    Its poles are two more than the inverse needs, so that the steps of readings that are held do not come through.
+    """
+
+    def band_of(bandwidth_hz: float) -> tuple[FloatArray, FloatArray]:
+        excess = slow.n_pole - np.trim_zeros(np.array(slow.numerator), "f").size + 1
+        return low_pass(BAND_ORDER, 2.0 * math.pi * bandwidth_hz, BAND_ORDER + excess + 1)
+
+    def error(log_f: float) -> float:
+        band = band_of(math.exp(log_f))
+        lag = power * abs(_band_error(band, freq_hz)) ** 2
+        return math.log(lag + alone_variance(slow, band, sample_rate_hz))
+
+    bounds = math.log(1.0), math.log(sample_rate_hz / 8.0)
+    best = minimize_scalar(error, bounds=bounds, method="bounded", options={"xatol": 1e-2})
+    return band_of(math.exp(best.x)), math.exp(best.fun)
+
+
+def _best_bandwidth(candidate: Callable[[float], FloatArray], sample_rate_hz: float) -> float:
     """Return the bandwidth with the least mean square error [Hz], up to a quarter of the sample rate."""
 
     def error(log_f: float) -> float:
-        return math.log(candidate(math.exp(log_f))[1].mean())
+        return math.log(candidate(math.exp(log_f)).mean())
 
     bounds = math.log(1.0), math.log(sample_rate_hz / 4.0)
     return math.exp(minimize_scalar(error, bounds=bounds, method="bounded", options={"xatol": 1e-2}).x)

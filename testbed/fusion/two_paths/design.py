@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 from scipy.optimize import minimize_scalar
 from scipy.signal import buttap
 
@@ -105,7 +105,9 @@ def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
     realised = sensor.realisation()
 
     def psd(freq_hz: FloatArray) -> FloatArray:
-        density: FloatArray = sensor.input_noise**2 + sensor.output_noise**2 / np.abs(realised.response(freq_hz)) ** 2
+        outer = sensor.output_noise**2 + sensor.outer_slow_density(freq_hz)
+        inner = sensor.input_noise**2 + sensor.inner_slow_density(freq_hz)
+        density: FloatArray = inner + outer / np.abs(realised.response(freq_hz)) ** 2
         return density
 
     return psd
@@ -218,3 +220,74 @@ def zeros_at_dc(sensor: SensorBelief) -> int:
     """
     b = np.array(sensor.numerator)
     return b.size - np.trim_zeros(b, "b").size
+
+
+def parallel(
+    slow: SensorBelief, fast: SensorBelief, order: int, crossover: float, band: tuple[FloatArray, FloatArray]
+) -> Paths:
+    """Return both paths side by side with a fixed crossover, and the slow sensor's model driven by their sum.
+
+    Parameters
+    ----------
+    slow, fast : SensorBelief
+        The sensor that is better at low frequency, and the other.
+    order : int
+        Of the low-pass L [-].
+    crossover : float
+        [rad/s].
+    band : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator of B in s.
+
+    Raises
+    ------
+    ValueError
+        If a sensor's inverse is unstable.
+    """
+    of_slow, poles = low_pass(order, crossover)
+    # The zeros of 1 - L at s = 0 take those of the fast sensor away.
+    of_fast = np.concatenate([poles[:-order], np.zeros(order - zeros_at_dc(fast))])
+    low, high = (
+        realised(_product(share, band[0], a), _product(poles, band[1], b))
+        for share, (a, b) in ((of_slow, inverse(slow)), (of_fast, inverse(fast)))
+    )
+    model = slow.realisation()
+    C, none = np.concatenate([low.C, high.C]), np.zeros(model.B.size)
+    return Paths(
+        A=np.block(
+            [
+                [block_diag(low.A, high.A), np.zeros((C.size, none.size))],
+                [np.outer(model.B, C), model.A],
+            ]
+        ),
+        B=np.concatenate([np.zeros(low.B.size), high.B, high.D * model.B]),
+        E=np.concatenate([low.B, np.zeros(high.B.size), none]),
+        C=np.concatenate([C, none]),
+        D=high.D,
+        H=np.concatenate([model.D * C, model.C]),
+        J=model.D * high.D,
+        innovate=False,
+    )
+
+
+def _product(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
+    return np.asarray(np.polymul(np.polymul(first, second), third), float)
+
+
+def inverted(sensor: SensorBelief, band: tuple[FloatArray, FloatArray]) -> Realisation:
+    """Return B / G, the band-limited inverse of a sensor, an integrator for a zero at s = 0.
+
+    Parameters
+    ----------
+    sensor : SensorBelief
+        G.
+    band : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator of B in s.
+
+    Raises
+    ------
+    ValueError
+        If the inverse is unstable.
+    """
+    a, b = inverse(sensor)
+    denominator = np.polymul(band[1], np.append(b, np.zeros(zeros_at_dc(sensor))))
+    return realised(np.asarray(np.polymul(band[0], a), float), np.asarray(denominator, float))

@@ -1,6 +1,4 @@
-"""Compiled kernel of the filters of two fixed paths: a fast sensor read at every step and a slow one that is held
-between its readings.
-"""
+"""Compiled kernel of the filters of two paths: an integrated fast sensor, held by the inverse of a slow one."""
 
 from __future__ import annotations
 
@@ -9,106 +7,132 @@ from numba import njit
 
 from testbed.fusion.kernels.covariance import RATE, STD
 
-# Row of the output behind RATE and STD.
 SLOW_INNOVATION = 2
-# Rows of `memory`, what stays between blocks.
-STARTED, READING, HELD, ESTIMATE, BLIND_TIME, SLOW_WAIT, DRIFT_VARIANCE, STEP, FAST_OUTSIDE, SLOW_OUTSIDE = range(10)
-MEMORY_ROWS = 10
-# Entries of `setting`: 1 to hold the innovation and 0 to hold the reading; step [s]; w [rad/s] and power [rad^2/s^2] of
-# the sine; what one second without readings costs: of the fast sensor in relative rate [1/s], of the slow one in
-# variance [rad^2/s^3]; decay per step of that; steps until the slow sensor counts as missing; square of the gate
-# against spikes [-] and how many in a row it keeps out; variance of the noise of a reading, fast and slow [rad^2/s^2].
-INNOVATE, PERIOD, TURN, POWER, FORGOTTEN, DRIFT, DECAY, PATIENCE, GATE_SQUARE, IN_A_ROW, FAST_NOISE, SLOW_NOISE = range(
-    12
-)
+# Entries of `memory`, what stays between blocks: whether either sensor has begun, its last reading, what the slow path
+# has added to the fast one and the slope of that, the variance of the sum, time without the fast sensor [s], steps
+# since the slow one, the step of the cycle; what an alternating rate at the start has put into the slow modes of the
+# slow path, and what of it is in the sum [rad/s].
+(
+    FAST_STARTED,
+    SLOW_STARTED,
+    READING,
+    HELD,
+    ADDED,
+    SLOPE,
+    VARIANCE,
+    BLIND,
+    SLOW_WAIT,
+    STEP,
+    LEAN,
+    LEANING,
+) = range(12)
+MEMORY_ENTRIES = 12
+# Entries of `setting`: step [s]; crossover and slope gain of the settled loop [rad/s], [rad^2/s^2]; its proportional
+# gain over the crossover [-]; density of the slow path's noise [rad^2/s]; variance of the slow path alone
+# [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor
+# counts as missing; the rate of rest, NaN if the start is unknown [rad/s]; what is left after a step of what
+# the slow path got wrong at its start [-]; drift of the fast path by itself [rad^2/s^3].
+PERIOD, CROSSOVER, SLOPE_GAIN, GAIN, DENSITY, ALONE, TURN, POWER, PATIENCE, REST, UPRIGHT, DRIFT = range(12)
 
 
 @njit(cache=True, error_model="numpy")
-def admitted(memory, row, limit, error, variance, gate_square):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Return whether a reading is taken: not missing and not one of the first `limit` in a row outside the gate,
-    counted in `memory[row]`.
-    """
-    if not np.isfinite(error):
-        return False
-    memory[row] = memory[row] + 1.0 if error * error > gate_square * variance else 0.0
-    return not 0.0 < memory[row] <= limit
-
-
-@njit(cache=True, error_model="numpy")
-def departure(setting, started, blind):  # type: ignore[no-untyped-def]  # pragma: no cover
+def departure(setting, blind):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the mean square [rad^2/s^2] by which the sine has left its value after `blind` seconds."""
     quiet = blind * setting[TURN]
-    return 2.0 * setting[POWER] * (1.0 - np.exp(-0.5 * quiet * quiet) if started > 0.0 else 1.0)
+    return 2.0 * setting[POWER] * (1.0 - np.exp(-0.5 * quiet * quiet))
 
 
 @njit(cache=True, error_model="numpy")
-def two_paths(x, memory, Phi, Gamma, ramp, E, C, D, H, J, settled, setting, fast, slow, out):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915  # pragma: no cover
-    """Run x+ = Phi x + Gamma z + ramp (z+ - z) + E h, rate = C x + D z, predicted slow reading = H x + J z, over a
-    block.
+def output(x, C, D, u):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return C x + D u."""
+    total = D * u
+    for i in range(x.size):
+        total += C[i] * x[i]
+    return total
 
-    `fast` has a reading at every step, `slow` where it is not NaN; infinite is a missing one. Without a fast reading
-    the rate stays as it is, and z is the reading that this would have caused. `settled` (n_step,) is the error variance
-    of the cycle of slow readings.
+
+@njit(cache=True, error_model="numpy")
+def advance(x, moved, Phi, Gamma, ramp, before, step):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Set x = Phi x + Gamma u + ramp (u+ - u), u the input before and `step` its increment."""
+    for i in range(x.size):
+        moved[i] = Gamma[i] * before + ramp[i] * step
+        for j in range(x.size):
+            moved[i] += Phi[i, j] * x[j]
+    for i in range(x.size):
+        x[i] = moved[i]
+
+
+@njit(cache=True, error_model="numpy")
+def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fast, slow, out):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915  # pragma: no cover
+    """Run both paths and the loop between them over a block.
+
+    A path is (Phi, Gamma, ramp, C, D, still), `still` its states in equilibrium with a unit input. `fast` has a reading
+    at every step, `slow` where it is not NaN; infinite is a missing one. `settled` (n_step,) is the error variance of
+    the cycle of slow readings.
     """
-    n = x.size
-    moved = np.empty(n)
+    Phi, Gamma, ramp, C, D, still = fast_path
+    Phi_slow, Gamma_slow, _, C_slow, D_slow, still_slow = slow_path
+    moved, moved_slow = np.empty(x_fast.size), np.empty(x_slow.size)
+    T, crossover = setting[PERIOD], setting[CROSSOVER]
+    final = setting[DENSITY] * crossover
+    turn = np.tanh(crossover * T)
     for k in range(fast.size):
         out[SLOW_INNOVATION, k] = np.nan
-        step = int(memory[STEP])
-        known = settled[step] + memory[DRIFT_VARIANCE]
-        spread = known + departure(setting, memory[STARTED], memory[BLIND_TIME] + setting[PERIOD])
-        seen = False
-        if memory[STARTED] == 0.0:
-            seen = admitted(
-                memory, FAST_OUTSIDE, setting[IN_A_ROW], fast[k], spread + setting[FAST_NOISE], setting[GATE_SQUARE]
-            )
-            if seen:
-                memory[STARTED], memory[READING], memory[ESTIMATE] = 1.0, fast[k], D * fast[k]
-        else:
-            before, held = memory[READING], memory[HELD]
-            total, slope = 0.0, D
-            for i in range(n):
-                moved[i] = Gamma[i] * before + E[i] * held
-                for j in range(n):
-                    moved[i] += Phi[i, j] * x[j]
-                total += C[i] * (moved[i] - ramp[i] * before)
-                slope += C[i] * ramp[i]
-            still = (memory[ESTIMATE] - total) / slope
-            variance = spread + setting[FAST_NOISE]
-            seen = admitted(memory, FAST_OUTSIDE, setting[IN_A_ROW], fast[k] - still, variance, setting[GATE_SQUARE])
-            z = fast[k] if seen else still
-            for i in range(n):
-                x[i] = moved[i] + ramp[i] * (z - before)
+        seen = np.isfinite(fast[k])
+        if memory[FAST_STARTED] > 0.0:
+            z = fast[k] if seen else memory[READING]
+            advance(x_fast, moved, Phi, Gamma, ramp, memory[READING], z - memory[READING])
             memory[READING] = z
-            if seen:
-                memory[ESTIMATE] = total + slope * z
-        if memory[STARTED] > 0.0 and seen:
-            lost = min(0.5 * setting[FORGOTTEN] * memory[BLIND_TIME], 1.0)
-            memory[DRIFT_VARIANCE] += lost * lost * departure(setting, 1.0, memory[BLIND_TIME])
-            memory[BLIND_TIME] = 0.0
-        else:
-            memory[BLIND_TIME] += setting[PERIOD]
+        elif seen:
+            memory[FAST_STARTED], memory[READING] = 1.0, fast[k]
+            for i in range(x_fast.size):
+                x_fast[i] = still[i] * fast[k]
+            if not np.isnan(setting[REST]):
+                memory[ADDED] = setting[REST] - output(x_fast, C, D, fast[k])
+        if memory[SLOW_STARTED] > 0.0:
+            advance(x_slow, moved_slow, Phi_slow, Gamma_slow, Gamma_slow, memory[HELD], 0.0)
         memory[SLOW_WAIT] += 1.0
-        if not np.isnan(slow[k]):
-            predicted = J * memory[READING]
-            for i in range(n):
-                predicted += H[i] * x[i]
-            variance = spread + setting[SLOW_NOISE]
-            there = admitted(
-                memory, SLOW_OUTSIDE, setting[IN_A_ROW], slow[k] - predicted, variance, setting[GATE_SQUARE]
-            )
-            # A loop around a rate that stands still would wind up.
-            there = there and (seen or setting[INNOVATE] == 0.0)
-            reading = slow[k] if there else predicted
-            memory[HELD] = reading - setting[INNOVATE] * predicted
-            if there:
-                out[SLOW_INNOVATION, k] = reading - predicted
-                memory[SLOW_WAIT] = 0.0
-        if memory[SLOW_WAIT] >= setting[PATIENCE]:
-            memory[DRIFT_VARIANCE] += setting[DRIFT] * setting[PERIOD]
-        elif memory[BLIND_TIME] == 0.0:
-            memory[DRIFT_VARIANCE] *= setting[DECAY]
-        hold = departure(setting, memory[STARTED], memory[BLIND_TIME])
-        out[RATE, k] = memory[ESTIMATE]
-        out[STD, k] = np.sqrt(settled[step] + memory[DRIFT_VARIANCE] + hold)
+        if np.isfinite(slow[k]):
+            if memory[SLOW_STARTED] == 0.0:
+                for i in range(x_slow.size):
+                    x_slow[i] = still_slow[i] * slow[k]
+            memory[SLOW_STARTED], memory[HELD], memory[SLOW_WAIT] = 1.0, slow[k], 0.0
+        alone = output(x_slow, C_slow, D_slow, memory[HELD])
+        carried = output(x_fast, C, D, memory[READING])
+        started = memory[FAST_STARTED] + memory[SLOW_STARTED] > 0.0
+        if seen:
+            memory[BLIND] = 0.0
+        elif started:
+            memory[BLIND] += T
+            memory[VARIANCE] += departure(setting, memory[BLIND]) - departure(setting, memory[BLIND] - T)
+        if memory[SLOW_STARTED] > 0.0 and memory[SLOW_WAIT] < setting[PATIENCE]:
+            # The slow path alone is never worse than this, and w = p / N^2 follows w' = w_c^2 - w^2.
+            w = min(memory[VARIANCE], setting[ALONE]) / setting[DENSITY]
+            e = alone - carried - memory[ADDED]
+            if np.isfinite(slow[k]):
+                out[SLOW_INNOVATION, k] = e
+            if seen:
+                gain = max(w, setting[GAIN] * min(w, crossover))
+                share = 1.0 - np.exp(-gain * T)
+                memory[ADDED] += share * e + T * memory[SLOPE]
+                memory[LEANING] += share * (memory[LEAN] - memory[LEANING])
+                memory[SLOPE] += T * setting[SLOPE_GAIN] * e
+                memory[VARIANCE] = setting[DENSITY] * crossover * (w + crossover * turn) / (crossover + w * turn)
+            elif memory[FAST_STARTED] == 0.0 or memory[VARIANCE] >= setting[ALONE]:
+                memory[ADDED] += e
+                memory[LEANING], memory[VARIANCE] = memory[LEAN], setting[ALONE]
+        else:
+            memory[ADDED] += T * memory[SLOPE]
+            if started:
+                memory[VARIANCE] += setting[DRIFT] * T
+        if memory[SLOW_STARTED] > 0.0:
+            memory[LEAN] *= setting[UPRIGHT]
+        step = int(memory[STEP])
+        rate = carried + memory[ADDED]
+        if not started:
+            rate = 0.0 if np.isnan(setting[REST]) else setting[REST]
+        out[RATE, k] = rate
+        # Before the loop has settled its part is more, after a known rest less, but the fast path's stays.
+        loop = max(settled[step] + memory[VARIANCE] - final, 0.1 * settled[step])
+        out[STD, k] = np.sqrt(loop + memory[LEANING] * memory[LEANING])
         memory[STEP] = (step + 1) % settled.size

@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.fusion.two_paths.design import input_psd, low_pass
+
 if TYPE_CHECKING:
+    from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
     from testbed.fusion.two_paths.design import Paths
     from testbed.signals import FloatArray
 
 _DOUBLINGS = 40
+# Where slow noise is looked for [Hz].
+_LOWEST_HZ, _HIGHEST_HZ = 1e-6, 1e2
 
 
 def noise_variance(paths: Paths, model: FusionModel, slow: int, fast: int) -> FloatArray:
@@ -82,3 +87,44 @@ def _joint_steps(
     read = np.zeros(held + 1)
     read[n:z], read[z] = paths.C, paths.D
     return [take @ move, *[move] * pause], [due, *[noise] * pause], read
+
+
+def slow_variance(slow: SensorBelief, fast: SensorBelief, order: int, crossover: float) -> float:
+    r"""Return the variance that the slow noise of both sensors leaves behind the loop [rad^2/s^2].
+
+    .. math:: 2 \int |L|^2 S_{slow} + |1 - L|^2 S_{fast} / |G_{fast}|^2 \, df
+
+    Parameters
+    ----------
+    slow, fast : SensorBelief
+        The sensor that is better at low frequency, and the other.
+    order : int
+        Of the low-pass L [-].
+    crossover : float
+        [rad/s].
+    """
+    freq = np.geomspace(_LOWEST_HZ, _HIGHEST_HZ, 800)
+    s = 2j * np.pi * freq
+    b, a = low_pass(order, crossover)
+    L = np.polyval(b, s) / np.polyval(a, s)
+    of_slow, of_fast = (one.slow_density(freq) / np.abs(one.realisation().response(freq)) ** 2 for one in (slow, fast))
+    density = np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast
+    return float(2.0 * np.trapezoid(density * freq, np.log(freq)))
+
+
+def alone_variance(slow: SensorBelief, band: tuple[FloatArray, FloatArray], sample_rate_hz: float) -> float:
+    r"""Return the variance of the slow path by itself, :math:`2 \int |B|^2 S_{slow} \, df` [rad^2/s^2].
+
+    Parameters
+    ----------
+    slow : SensorBelief
+        The sensor that is better at low frequency.
+    band : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator of B in s.
+    sample_rate_hz : float
+        Of the filter [Hz].
+    """
+    freq = np.geomspace(_LOWEST_HZ, 0.5 * sample_rate_hz, 800)
+    s = 2j * np.pi * freq
+    B = np.polyval(band[0], s) / np.polyval(band[1], s)
+    return float(2.0 * np.trapezoid(np.abs(B) ** 2 * input_psd(slow)(freq) * freq, np.log(freq)))

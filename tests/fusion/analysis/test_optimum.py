@@ -49,7 +49,7 @@ def test_running_filter_converges_to_the_cycle(order: int) -> None:
         numerator=(600.0,), denominator=(1.0, 600.0), input_noise=2e-8, output_noise=2e-8
     )
     q = {1: 0.3 * DEG**2, 3: 1e10 * DEG**2}[order]
-    block = Kalman(belief, RATES, KalmanParameters(order=order, q=q, gate=False)).process(
+    block = Kalman(belief, RATES, KalmanParameters(order=order, q=q, coloured=False, gate=False)).process(
         {"mems_gyro": np.zeros(2000), "mhd_ars": np.zeros(20000)}
     )
     settled = settled_filters(belief, RATES, order=order, q=np.array([q]))
@@ -219,6 +219,22 @@ def test_noise_variance_is_that_of_truth_and_filter_together() -> None:
                 last.append(joint[n, n])
         # The true rate is zero; the slowest mode, 75 rad/s, is down by e^-75 in variance.
         assert np.mean(last) == pytest.approx(fixed.noise_variance()[i, 0], rel=1e-6, abs=0.0)
+
+
+@pytest.mark.oracle
+def test_coloured_noise_that_is_white_is_the_white_noise() -> None:
+    """The density of the MHD readings, given as if it came on top, leaves what the model's own does: a filter of 1.6
+    Hz, q / n^2 = (10 rad/s)^2.
+    """
+    belief = load_belief("identified")
+    fixed = settled_filters(belief, RATES, order=1, q=np.array([1e-12]))
+    mhd = belief["mhd_ars"].output_noise ** 2
+    found = fixed.coloured_variance([None, lambda freq: np.full(freq.shape, mhd)])
+    assert found[0, 0] == 0.0
+    # Ten points per decade of a crossover of first order: 1 %; what passes above 100 Hz: less.
+    assert found[1, 0] == pytest.approx(fixed.noise_variance()[1, 0], rel=0.02, abs=0.0)
+    more = optimum(belief, RATES, [(1.0, DEG)], excess={"mhd_ars": lambda freq: mhd * 0.1 / freq})
+    assert more.rmse > optimum(belief, RATES, [(1.0, DEG)]).rmse
 
 
 def test_a_sensor_without_output_noise_is_refused() -> None:

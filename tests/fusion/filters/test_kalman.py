@@ -31,7 +31,7 @@ def _run(model: FusionModel, Z: FloatArray, x: FloatArray, P: FloatArray) -> Flo
 @pytest.mark.oracle
 def test_kalman_equals_filterpy(reference: Any) -> None:
     readings = reference.readings(reference.sines((4.0, 1.0), duration=0.1), 5)
-    ours = Kalman(default_belief(), RATES, KalmanParameters()).process(readings)
+    ours = Kalman(default_belief(), RATES, KalmanParameters(coloured=False)).process(readings)
     model = build_model(default_belief(), RATES, order=1, q=Q_RATE)
     peer = KalmanFilter(dim_x=5, dim_z=2)
     peer.x, peer.P, peer.F, peer.Q = np.zeros((5, 1)), model.P0.copy(), model.F, model.Q
@@ -91,7 +91,7 @@ def test_multi_rate_reaches_the_periodic_riccati_solution() -> None:
             g = P @ H[1]
             post = P - np.outer(g, g) / (H[1] @ g + model.R[1])
         wanted.append(np.sqrt(post[0, 0]))
-    stage = Kalman(default_belief(), RATES, KalmanParameters())
+    stage = Kalman(default_belief(), RATES, KalmanParameters(coloured=False, gate=False))
     for _ in range(40):  # of 10 s
         block = stage.process({"mems_gyro": np.zeros(20_000), "mhd_ars": np.zeros(200_000)})
     np.testing.assert_allclose(block.std[-steps:], wanted, rtol=1e-6)
@@ -114,7 +114,7 @@ def test_kalman_equals_batch_least_squares(reference: Any) -> None:
     readings = reference.readings(reference.sines((10.0, 1.0), duration=n_time / 20000.0), 7)
     z = np.concatenate([readings["mems_gyro"], readings["mhd_ars"]])
     cross = (maps[-1] @ prior @ G.T)[0]
-    ours = Kalman(default_belief(), RATES, KalmanParameters()).process(readings)
+    ours = Kalman(default_belief(), RATES, KalmanParameters(coloured=False)).process(readings)
     # eps times the condition of the covariance, P0 / R = 1e9.
     assert ours.rate[-1] == pytest.approx(cross @ np.linalg.solve(covariance, z), rel=0, abs=1e-6 * DEG)
     variance = (maps[-1] @ prior @ maps[-1].T)[0, 0] - cross @ np.linalg.solve(covariance, cross)

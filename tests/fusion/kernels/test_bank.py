@@ -26,9 +26,7 @@ def test_root_steps_of_the_bank_are_those_of_one_filter() -> None:
         (at,) = np.nonzero(values)
         row[: at.size], row[-1] = at, at.size
     total, spread, e, g = np.empty(M), np.empty(M), np.empty(M), np.empty((n, M))
-    predict_root_bank(
-        x, D, F, nonzero, S, np.empty((n, 2 * n, M)), np.empty((n, M)), np.empty(M), total, np.empty(M, np.bool_), n, M
-    )
+    predict_root_bank(x, D, F, nonzero, S, np.empty((n, 2 * n, M)), np.empty((n, M)), np.empty(M), total, n, M)
     innovate_root_bank(x, D, h, seen, z, e, spread, g, n, M)
     update_root_bank(x, D, R, e, spread, g, total, n, M)
     for m, (x_one, D_one, S_one) in enumerate(ones):

@@ -9,12 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from testbed.fusion import estimate
 from testbed.fusion.belief import default_belief
+from testbed.fusion.filters import kalman, shakf, steady_state, wideband
 from testbed.fusion.kernels.covariance import HEADER_ROWS, kalman_kernel, predict, update
 from testbed.fusion.model import build_model
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
+
+
+KERNELS = {
+    kalman: "kalman_kernel",
+    shakf: "adaptive_kernel",
+    steady_state: "settling_kernel",
+    wideband: "bank_kernel",
+}
 
 
 def _rows(readings: dict[str, FloatArray]) -> FloatArray:
@@ -53,11 +63,11 @@ def test_predict_and_update_equal_rational_arithmetic() -> None:
     """Small integers: every product and sum is exact in floating point but the division by C."""
     F, P, Q = np.array([[1.0, 2.0], [0.0, 1.0]]), np.array([[5.0, 1.0], [1.0, 3.0]]), np.array([[1.0, 0.0], [0.0, 2.0]])
     x, H = np.array([1.0, -2.0]), np.array([[1.0, 3.0]])
-    predict(x, P, F, Q, np.empty((2, 2)), np.empty(2), 2)
+    predict(x, P, F, Q, np.zeros((2, 2), int), np.empty((2, 2)), np.empty(2), 2, 2)
     assert np.array_equal(x, [-3.0, -2.0])
     assert np.array_equal(P, [[22.0, 7.0], [7.0, 5.0]])
     R, z = 4, 10
-    update(x, P, H, 0, float(z), float(R), np.empty(2), np.empty(2), 2)
+    update(x, P, H, np.array([[0, 2, 2, 2]]), 0, float(z), float(R), np.empty(2), np.empty(2), 2, 2)
     g = [22 + 21, 7 + 15]
     C = g[0] + 3 * g[1] + R
     K = [Fraction(one, C) for one in g]
@@ -78,9 +88,28 @@ def test_update_keeps_a_variance_far_below_the_prior(R: float) -> None:
     eps.
     """
     x, P, H = np.zeros(1), np.eye(1), np.ones((1, 1))
-    update(x, P, H, 0, 0.0, R, np.empty(1), np.empty(1), 1)
+    update(x, P, H, np.array([[0, 1, 1, 1]]), 0, 0.0, R, np.empty(1), np.empty(1), 1, 1)
     eps = np.finfo(float).eps
     assert P[0, 0] == pytest.approx(R / (1.0 + R), rel=10 * (eps / R) ** 2 + 10 * eps, abs=0.0)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("name", ["kalman", "steady_state", "shakf", "wideband"])
+def test_slow_states_known_to_the_kernel_make_the_same_filter(
+    name: str, reference: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernels that take every state for one of the core go through all products; sums differ by their order."""
+    readings = reference.readings(reference.sines((4.0, 1.0), duration=0.3), 3)
+    readings["mhd_ars"][500:520] = np.nan
+    chosen = {"sample_rate_hz": reference.rates, "start": "rest", "coloured": True}
+    ours = estimate(name, readings, **chosen)
+    for module, kernel in KERNELS.items():
+        plain = getattr(module, kernel)
+        monkeypatch.setattr(module, kernel, lambda *sizes, plain=plain: plain(*sizes[:-1]))
+    whole = estimate(name, readings, **chosen)
+    assert not np.array_equal(ours.rate, whole.rate)
+    np.testing.assert_allclose(ours.rate, whole.rate, rtol=0, atol=1e-8 * np.radians(1.0))
+    np.testing.assert_allclose(ours.std, whole.std, rtol=1e-6)
 
 
 def test_nothing_is_predicted_before_the_first_reading() -> None:
@@ -100,7 +129,8 @@ from testbed.fusion.kernels.covariance import JOSEPH, adaptive_kernel, kalman_ke
 z = {"mems_gyro": np.zeros(2), "mhd_ars": np.zeros(20)}
 for name in ("kalman", "arw_shakf"):
     estimate(name, z, sample_rate_hz={"mems_gyro": 2000.0, "mhd_ars": 20000.0})
-print(sum(sum(k(5, 2, JOSEPH).stats.cache_misses.values()) for k in (kalman_kernel, adaptive_kernel)))
+kernels = kalman_kernel(16, 2, JOSEPH, 11), adaptive_kernel(5, 2, JOSEPH, 0)
+print(sum(sum(k.stats.cache_misses.values()) for k in kernels))
 """
 
 

@@ -13,7 +13,8 @@ from testbed.fusion.filters.blending import Blending
 from testbed.fusion.filters.complementary import Complementary
 from testbed.fusion.model import build_model
 from testbed.fusion.two_paths.base import TwoPathParameters
-from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass
+from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass, parallel
+from testbed.fusion.two_paths.kernel import VARIANCE
 from testbed.fusion.two_paths.noise import noise_variance
 
 DEG = np.pi / 180.0
@@ -34,6 +35,12 @@ QUICK = {
 }
 
 
+def white(belief: dict[str, SensorBelief]) -> dict[str, SensorBelief]:
+    """Return a belief without its slow noise."""
+    none = {"bias_instability": 0.0, "rate_random_walk": 0.0, "noise_knee": None}
+    return {name: one.model_copy(update=none) for name, one in belief.items()}
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize(("order", "divisor"), [(1, 1.0), (2, np.sqrt(3.0))])
 def test_crossover_is_the_closed_form(order: int, divisor: float) -> None:
@@ -47,7 +54,7 @@ def test_crossover_is_the_closed_form(order: int, divisor: float) -> None:
 
 @pytest.mark.parametrize(("cls", "crossover"), [(Complementary, 5.60e-3), (Blending, 3.24e-3)])
 def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) -> None:
-    found = cls(load_belief("identified"), RATES, TwoPathParameters())
+    found = cls(white(load_belief("identified")), RATES, TwoPathParameters())
     assert found.crossover_hz == pytest.approx(crossover, rel=2e-3, abs=0.0)
     # The search ends within 1 %.
     assert found.bandwidth_hz == pytest.approx(169.0, rel=0.02)
@@ -55,12 +62,11 @@ def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) ->
 
 @pytest.mark.oracle
 def test_no_first_order_crossover_beats_the_derived_one_and_the_optimum_is_not_beaten() -> None:
-    belief = load_belief("identified")
+    belief = white(load_belief("identified"))
     best = Complementary(belief, RATES, TwoPathParameters())
 
     def claimed(**own: float) -> float:
-        zeros = {"mems_gyro": np.zeros(1), "mhd_ars": np.zeros(1)}
-        return float(Complementary(belief, RATES, TwoPathParameters(**own)).process(zeros).std[0])
+        return float(np.sqrt(Complementary(belief, RATES, TwoPathParameters(**own))._settled.mean()))
 
     least = claimed()
     for factor in (0.8, 1.25):
@@ -105,56 +111,20 @@ def test_exact_readings_of_a_sine_give_the_band_end(cls: Any, freq: float) -> No
     c = np.linalg.lstsq(basis.T, rate[30_000:], rcond=None)[0]
     b, a = band_end(QUICK["mems_gyro"], QUICK["mhd_ars"], 2.0 * np.pi * 300.0)
     s = 2j * np.pi * freq
-    wanted = np.polyval(b, s) / np.polyval(a, s)
-    if cls is Blending:
-        # The loop sees what the band end leaves out, and closes on it: (B + P G) / (1 + P G) with P of corner 2 Hz.
-        w = 2.0 * np.pi * 2.0
-        loop = (np.sqrt(2.0) * w * s + w**2) / s**2 * QUICK["mems_gyro"].realisation().response(np.array([freq]))[0]
-        wanted = (wanted + loop) / (1.0 + loop)
+    low, poles = low_pass(cls.order, 2.0 * np.pi * 2.0)
+    share = np.polyval(low, s) / np.polyval(poles, s)
+    # The slow path has a band end of its own, the best for it alone.
+    Phi, Gamma, _, C, D, _ = found._paths[1]
+    z_step = np.exp(s / 20_000.0)
+    alone = C @ np.linalg.solve(z_step * np.eye(len(C)) - Phi, Gamma) + D
+    alone *= QUICK["mems_gyro"].realisation().response(np.array([freq]))[0]
+    wanted = (1.0 - share) * np.polyval(b, s) / np.polyval(a, s) + share * alone
     # Held readings of the slow path of `complementary` are half a gyro period late: w T / 2 of the share of the slow
     # path.
-    late = np.pi * freq / 2000.0 * min(1.0, 2.0 / freq) if cls is Complementary else 0.0
+    late = np.pi * freq / 2000.0 * abs(share)
     # Hold between samples, straight against a sine: (w T)^2 / 12, and what is left of the start, e^-15 at least.
     tolerance = late + (2.0 * np.pi * freq / 20_000.0) ** 2 / 12.0 + 1e-5
     assert abs(complex(c[1], c[0]) / DEG - wanted) < tolerance
-
-
-def plain_twin(found: Any, fast: np.ndarray, slow: np.ndarray) -> np.ndarray:
-    """Run the recursion with matrices, fast readings complete."""
-    Phi, Gamma, ramp, E, C, D, H, J, _ = found._matrices
-    innovate = found._setting[0]
-    x, held, rates = np.zeros(len(Phi)), 0.0, []
-    for k, z in enumerate(fast):
-        if k:
-            x = Phi @ x + Gamma * fast[k - 1] + ramp * (z - fast[k - 1]) + E * held
-        if not np.isnan(slow[k]):
-            predicted = H @ x + J * z
-            held = (slow[k] if np.isfinite(slow[k]) else predicted) - innovate * predicted
-        rates.append(C @ x + D * z)
-    return np.array(rates)
-
-
-@pytest.mark.parametrize("cls", FILTERS)
-def test_kernel_is_its_plain_twin(cls: Any) -> None:
-    rng = np.random.default_rng(5)
-    # Within the gate against spikes, of which the plain recursion knows nothing.
-    z = {"mems_gyro": 0.1 * DEG * rng.standard_normal(200), "mhd_ars": 0.1 * DEG * rng.standard_normal(2000)}
-    z["mems_gyro"][50:70] = np.nan
-    found = cls(QUICK, RATES, TwoPathParameters())
-    slow = np.full(2000, np.nan)
-    slow[::10] = np.where(np.isfinite(z["mems_gyro"]), z["mems_gyro"], np.inf)
-    wanted = plain_twin(found, z["mhd_ars"], slow)
-    # Sums in another order, over 2000 steps.
-    np.testing.assert_allclose(found.process(z).rate, wanted, rtol=0.0, atol=1e-11 * np.abs(wanted).max())
-
-
-@pytest.mark.parametrize("cls", FILTERS)
-def test_a_lasting_change_passes_the_gate_after_ten_readings(cls: Any) -> None:
-    """A rate that jumps to 200 deg/s is outside the gate, but what lasts is the signal: the eleventh reading counts."""
-    fast = np.concatenate([np.zeros(2000), np.full(2000, 200.0 * DEG)])
-    found = cls(QUICK, RATES, TwoPathParameters()).process({"mhd_ars": fast, "mems_gyro": fast[::10]})
-    assert np.abs(found.rate[:2010]).max() < 1e-6
-    assert found.rate[-1] > 100.0 * DEG
 
 
 @pytest.fixture(scope="module")
@@ -178,13 +148,13 @@ def noise_of_many() -> np.ndarray:
 def test_claimed_noise_is_the_scatter_of_many_runs(cls: Any, noise_of_many: np.ndarray) -> None:
     power, claimed = [], 0.0
     for run in range(60):
-        found = cls(QUICK, RATES, TwoPathParameters(amplitude=1e-12, bandwidth=300.0))
+        found = cls(QUICK, RATES, TwoPathParameters(amplitude=1e-12, bandwidth=300.0, start="rest"))
         block = found.process({"mems_gyro": noise_of_many[::10, 0, run], "mhd_ars": noise_of_many[:, 1, run]})
         power.append(np.mean(block.rate[12_000:] ** 2))
         claimed = float(np.sqrt(np.mean(block.std[-10:] ** 2)))
     # 60 runs, each of some ten independent stretches of the slow part: 5 sqrt(2 / 600) in variance, half of it in
-    # deviation.
-    assert np.sqrt(np.mean(power)) == pytest.approx(claimed, rel=0.15, abs=0.0)
+    # deviation; a loop of order 2 overshoots at first what one equation for both orders claims.
+    assert np.sqrt(np.mean(power)) == pytest.approx(claimed, rel=0.15 if cls is Complementary else 0.2, abs=0.0)
 
 
 @pytest.mark.oracle
@@ -199,38 +169,10 @@ def test_noise_variance_of_the_plain_pair_is_the_closed_form(cls: Any, factor: f
     fast = PLAIN["mhd_ars"]
     found = cls({"mems_gyro": slow, "mhd_ars": fast}, RATES, TwoPathParameters(bandwidth=20.0))
     band = band_end(slow, fast, 2.0 * np.pi * 20.0)
-    paths = found.paths(slow, fast, 2.0 * np.pi * found.crossover_hz, band)
+    paths = parallel(slow, fast, cls.order, 2.0 * np.pi * found.crossover_hz, band)
     wanted = factor * N * SMALL * CORNER + 5.0 / 3.0 * 2.0 * np.pi * 20.0 * SMALL**2
     # The crossover is within 2 % of its flat minimum; sampling folds (a T)^2 / 12 = 0.2 % of the gyro's noise back.
     assert noise_variance(paths, found.model, 0, 1).mean() == pytest.approx(wanted, rel=0.006, abs=0.0)
-
-
-@pytest.mark.oracle
-@pytest.mark.parametrize("cls", FILTERS)
-def test_share_of_each_path_in_continuous_time(cls: Any) -> None:
-    """B L and B (1 - L) side by side; P G / (1 + P G) and B / (1 + P G) for the loop, P = (k_p s + k_i) / s^2."""
-    slow, fast = (load_belief("identified")[name] for name in ("mems_gyro", "mhd_ars"))
-    w = 2.0 * np.pi * 0.05
-    band = band_end(slow, fast, 2.0 * np.pi * 200.0)
-    paths = cls(load_belief("identified"), RATES, TwoPathParameters()).paths(slow, fast, w, band)
-    freq = np.array([0.003, 0.05, 0.3, 8.0, 150.0, 900.0])
-    s = 2j * np.pi * freq
-    end = np.polyval(band[0], s) / np.polyval(band[1], s)
-    of_slow, of_fast = (one.realisation().response(freq) for one in (slow, fast))
-    if paths.innovate:
-        loop = (np.sqrt(2.0) * w * s + w**2) / s**2 * of_slow
-        shares = loop / (1.0 + loop), end / (1.0 + loop)
-    else:
-        shares = end * w / (s + w), end * s / (s + w)
-    for wanted, slow_part, fast_part in zip(shares, (of_slow, 0.0 * of_slow), (0.0 * of_fast, of_fast), strict=True):
-        for k, at in enumerate(s):
-            A = paths.A - paths.innovate * np.outer(paths.E, paths.H)
-            held = slow_part[k] - paths.innovate * paths.J * fast_part[k]
-            x = np.linalg.solve(at * np.eye(len(A)) - A, paths.B * fast_part[k] + paths.E * held)
-            # Polynomials of degree ten over seven decades keep nine digits.
-            assert abs(paths.C @ x + paths.D * fast_part[k] - wanted[k]) < 1e-8
-            # And the slow reading is foreseen as the slow sensor reads the estimate.
-            assert abs(paths.H @ x + paths.J * fast_part[k] - of_slow[k] * wanted[k]) < 1e-8
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -240,7 +182,7 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
     belief = load_belief("identified")
     response = belief["mhd_ars"].realisation().response(np.array([10.0]))[0]
     z = {"mhd_ars": (DEG * response * np.exp(20j * np.pi * t)).imag, "mems_gyro": np.full(4000, np.nan)}
-    block = cls(belief, RATES, TwoPathParameters()).process(z)
+    block = cls(belief, RATES, TwoPathParameters(start="rest")).process(z)
     # 1 % of the amplitude: the start-up of a sine that was there before.
     assert np.std((block.rate - DEG * np.sin(20.0 * np.pi * t))[20_000:]) < 0.01 * DEG
     low = 2.0 * np.pi * 1e-4
@@ -253,29 +195,15 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
 
 @pytest.mark.parametrize("cls", FILTERS)
 def test_drift_is_forgotten_once_the_slow_sensor_is_back(cls: Any) -> None:
-    """Its variance falls by exp(-2 w t), w the slowest pole of the crossover: w_c of the first order, w_c / sqrt(2) of
-    the loop.
-    """
-    z = {"mems_gyro": np.zeros(4000), "mhd_ars": np.zeros(40_000)}
-    whole = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std
-    z["mems_gyro"][500:2000] = np.nan
-    extra = cls(QUICK, RATES, TwoPathParameters(crossover=0.5)).process(z).std ** 2 - whole**2
-    assert extra[19_999] > 0.0
-    w = np.pi * {Complementary: 1.0, Blending: np.sqrt(0.5)}[cls]
+    """Its variance falls by exp(-2 w_c t), as the scalar Riccati equation has it near its end."""
+    z = {"mems_gyro": np.zeros(10_000), "mhd_ars": np.zeros(100_000)}
+    whole = cls(QUICK, RATES, TwoPathParameters(crossover=0.5, gate=False, start="rest")).process(z).std
+    z["mems_gyro"][6500:8000] = np.nan
+    extra = cls(QUICK, RATES, TwoPathParameters(crossover=0.5, gate=False, start="rest")).process(z).std ** 2 - whole**2
+    assert extra[79_999] > 0.0
+    w = np.pi
     # 0.6 s after; the difference of two variances keeps some digits less.
-    assert extra[32_000] / extra[20_000] == pytest.approx(np.exp(-2.0 * w * 0.6), rel=1e-3)
-
-
-@pytest.mark.parametrize("cls", FILTERS)
-def test_a_lost_fast_sensor_holds_the_rate(cls: Any) -> None:
-    rng = np.random.default_rng(1)
-    z = {"mhd_ars": 1e-3 * rng.standard_normal(30_000), "mems_gyro": 1e-3 * rng.standard_normal(3000)}
-    z["mhd_ars"][10_000:20_000] = np.nan
-    block = cls(QUICK, RATES, TwoPathParameters()).process(z)
-    assert np.all(block.rate[10_000:20_000] == block.rate[9_999])
-    # A sine of unknown phase departs by its own power twice, no more.
-    assert block.std[19_999] == pytest.approx(DEG, rel=1e-3, abs=0.0)
-    assert np.abs(block.rate[20_000:]).max() < 0.1
+    assert extra[92_000] / extra[80_000] == pytest.approx(np.exp(-2.0 * w * 0.6), rel=1e-2)
 
 
 def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> None:
@@ -284,7 +212,7 @@ def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> N
     """
     left = {}
     for cls in FILTERS:
-        found = cls(QUICK, RATES, TwoPathParameters(crossover=1.0, bandwidth=300.0))
+        found = cls(QUICK, RATES, TwoPathParameters(crossover=1.0, bandwidth=300.0, gate=False))
         z = {"mems_gyro": np.zeros(8000), "mhd_ars": np.full(80_000, 1e-4)}
         left[cls] = abs(found.process(z).rate[-1]) / 1e-4
     low = 1e-3
@@ -300,14 +228,9 @@ def test_sensors_that_cannot_be_joined_are_refused(cls: Any) -> None:
         cls(good, {"mhd_ars": 20_000.0}, TwoPathParameters())
     with pytest.raises(ValueError, match="highest sample rate"):
         cls(good, {"mhd_ars": 2000.0, "mems_gyro": 20_000.0}, TwoPathParameters())
-    right = SensorBelief(numerator=(-2000.0, 9e5, 0.0), denominator=(0.255, 2178.0, 33900.0), output_noise=1e-7)
+    right = SensorBelief(numerator=(-2000.0, 5e4, 0.0), denominator=(0.255, 2178.0, 33900.0), output_noise=1e-7)
     with pytest.raises(ValueError, match="inverse is stable"):
         cls(good | {"mhd_ars": right}, RATES, TwoPathParameters())
-
-
-def test_a_loop_wider_than_its_sensor_is_refused() -> None:
-    with pytest.raises(ValueError, match="crossover: expected one well inside"):
-        Blending(load_belief("eq39"), RATES, TwoPathParameters(crossover=800.0))
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -322,11 +245,53 @@ def test_a_zero_far_beyond_the_clock_is_a_constant(cls: Any) -> None:
     np.testing.assert_allclose(a, b, rtol=0.0, atol=2e-3 * np.abs(a).max())
 
 
-def test_two_zeros_at_dc_raise_the_order_of_one_and_are_refused_by_the_other() -> None:
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_fast_sensor_with_two_zeros_at_dc_is_refused(cls: Any) -> None:
     twice = SensorBelief(
         numerator=(9000.0, 0.0, 0.0), denominator=tuple(np.poly([-9000.0, -15.0, -0.3])), output_noise=1e-7
     )
-    belief = {**PLAIN, "mhd_ars": twice}
-    assert np.isfinite(Complementary(belief, RATES, TwoPathParameters()).crossover_hz)
     with pytest.raises(ValueError, match="at most one zero"):
-        Blending(belief, RATES, TwoPathParameters())
+        cls({**PLAIN, "mhd_ars": twice}, RATES, TwoPathParameters())
+
+
+@pytest.mark.parametrize("cls", FILTERS)
+def test_two_sensors_without_dc_are_refused(cls: Any) -> None:
+    """Their error grows without bound: 3.6e9 deg/s at the end of a run that seemed to end well."""
+    blind = load_belief("eq39")["mhd_ars"]
+    belief = {"a": blind, "b": blind.model_copy(update={"output_noise": 2e-7})}
+    with pytest.raises(ValueError, match="to see a constant rate"):
+        cls(belief, {"a": 20_000.0, "b": 20_000.0}, TwoPathParameters())
+
+
+@pytest.mark.oracle
+def test_crossover_from_the_start_is_w_coth_w_t() -> None:
+    """And from rest w tanh(w t): the variance of the loop's part is N^2 times that."""
+    belief = white(load_belief("identified"))
+    n = 200_000
+    z = {"mems_gyro": np.zeros(n // 10), "mhd_ars": np.zeros(n)}
+    for start, law in (("unknown", lambda x: 1.0 / np.tanh(x)), ("rest", np.tanh)):
+        found = Complementary(belief, RATES, TwoPathParameters(start=start, gate=False))
+        found.process(z)
+        w, N = 2.0 * np.pi * found.crossover_hz, belief["mems_gyro"].input_noise
+        # The density of the slow path at the crossover, which its word adds 1e-4 to.
+        assert found._memory[VARIANCE] == pytest.approx(N**2 * w * law(w * n / 20_000.0), rel=2e-3)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("cls", FILTERS)
+def test_a_lost_fast_sensor_leaves_the_slow_path(cls: Any) -> None:
+    """From a few milliseconds on the estimate is the slow sensor's inverse by itself, and its claim that path's."""
+    rng = np.random.default_rng(1)
+    z = {"mhd_ars": 1e-5 * rng.standard_normal(30_000), "mems_gyro": 1e-5 * rng.standard_normal(3000)}
+    lost = {**z, "mhd_ars": z["mhd_ars"].copy()}
+    lost["mhd_ars"][10_000:20_000] = np.nan
+    found = cls(QUICK, RATES, TwoPathParameters())
+    block, other = (
+        found.process(lost),
+        cls(QUICK, RATES, TwoPathParameters()).process({**lost, "mhd_ars": -lost["mhd_ars"]}),
+    )
+    inside = slice(11_000, 20_000)
+    np.testing.assert_allclose(block.rate[inside], other.rate[inside], rtol=0.0, atol=1e-9)
+    # The same at every cycle of the slow readings.
+    assert np.ptp(block.std[inside]) < 0.05 * block.std[15_000]
+    assert np.isfinite(block.rate).all()
