@@ -173,8 +173,8 @@ class Judge:
 
 
 def in_deg(rate: float | None) -> float | None:
-    """Return a rate [rad/s] in deg/s, None for None."""
-    return None if rate is None else float(np.rad2deg(rate))
+    """Return a rate [rad/s] in deg/s, None where there is none."""
+    return None if rate is None or not np.isfinite(rate) else float(np.rad2deg(rate))
 
 
 def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:
