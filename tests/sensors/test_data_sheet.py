@@ -236,14 +236,11 @@ def test_a_part_has_no_contradiction_and_a_belief_of_its_own_sheet(name: str) ->
     sensor, belief = load_preset(name), preset_belief(name)
     assert sensor.doubts() == []
     assert belief is not None
-    freq = np.geomspace(0.01, 0.2 * sensor.sample_rate, 30)
-    got, made = belief.realisation().response(freq), sensor.response(freq)
-    # Exact for a low-pass of poles. Of the mean over an interval x^4 / 720 is left, and the half sample of 50 us by
-    # which the mean of samples is younger than that of a continuous rate; a scale factor's error is not believed.
-    turn = 2.0 * np.pi * freq
-    mean = (turn / sensor.sample_rate) ** 4 / 720.0 + turn * 25e-6 if isinstance(sensor, Fog) else 1e-9
-    left = mean + abs(sensor.scale_factor_error)  # type: ignore[attr-defined]
-    assert np.all(np.abs(got / made - 1.0) < 1.1 * left)
+    freq = np.geomspace(0.01, 0.4 * sensor.sample_rate, 30)
+    numerator, denominator = sensor.transfer_function  # type: ignore[attr-defined]
+    np.testing.assert_allclose(
+        belief.realisation().response(freq), transfer(list(numerator), list(denominator), freq), rtol=1e-9
+    )
     slow = ("bias_instability", "rate_random_walk", "lowest_frequency")
     assert [getattr(belief, key) for key in slow] == [getattr(sensor, key) for key in slow]
     assert belief.range == sensor.full_scale()
