@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed.chain.pipeline import Chain
-from testbed.errors import Problem, RunError, ScenarioError
 from testbed.runs.size import disk_bytes
 from testbed.signals import BLOCK
 
@@ -60,19 +59,16 @@ def forecast(scenario: Scenario) -> Forecast:
 
     Raises
     ------
-    ScenarioError
+    RunError
         If it fails already there.
     """
     samples = scenario.n_time
-    try:
-        chain = Chain(scenario)
-        block = chain.process(min(_WARM, samples))
-        tried = min(_TRIED, samples - block.n_time)
-        begin = time.process_time()
-        if tried:
-            block = chain.process(tried)
-    except RunError as error:
-        raise ScenarioError([Problem(f"the run would fail at its beginning: {error}", file=scenario.file)]) from error
+    chain = Chain(scenario)
+    block = chain.process(min(_WARM, samples))
+    tried = min(_TRIED, samples - block.n_time)
+    begin = time.process_time()
+    if tried:
+        block = chain.process(tried)
     spent = time.process_time() - begin
     disk = disk_bytes(block, chain.rates, samples)
     per_block = _WORKING * disk / samples * min(BLOCK, samples)

@@ -10,6 +10,7 @@ import typer
 
 from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, expanded
 from testbed.cli.status import MISSED
+from testbed.errors import Problem, RunError, ScenarioError
 
 
 @expanded
@@ -68,7 +69,10 @@ def check(
 
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     output.warn(warnings(loaded))
-    size = forecast(loaded)
+    try:
+        size = forecast(loaded)
+    except RunError as error:
+        raise ScenarioError([Problem(f"the run would fail at its beginning: {error}", file=loaded.file)]) from error
     facts = table_facts(loaded, size.step)
     document = {
         **scenario_document(loaded, facts),
