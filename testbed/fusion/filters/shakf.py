@@ -133,7 +133,6 @@ class Shakf(SageHusa):
     """
 
     Parameters: ClassVar[type[Part]] = ShakfParameters
-    blames_the_other = "R of the gyro takes what a railed MHD sensor did for noise, and falls back slowly"
     # (17) sees little but H P H' at first: R of the gyro falls to its floor and fixes a wrong slow state; std is 10 to
     # 25 times too small.
     dishonest = (
