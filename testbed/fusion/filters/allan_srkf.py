@@ -69,7 +69,6 @@ class AllanSrkf(AdaptiveFilter):
     """
 
     Parameters: ClassVar[type[Part]] = AllanSrkfParameters
-    # R has infinite memory within its clamp of 10: after a spike the noise may be sqrt(10) times as large for minutes.
     start_leaves = (0.007 * DEG, 0.007 * DEG)
     dishonest = (
         "q is chosen so large, for paper 2's swings of 50 deg/s, that P claims twenty times the error of smaller ones"

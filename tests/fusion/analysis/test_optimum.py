@@ -221,22 +221,6 @@ def test_noise_variance_is_that_of_truth_and_filter_together() -> None:
         assert np.mean(last) == pytest.approx(fixed.noise_variance()[i, 0], rel=1e-6, abs=0.0)
 
 
-@pytest.mark.oracle
-def test_coloured_noise_that_is_white_is_the_white_noise() -> None:
-    """The density of the MHD readings, given as if it came on top, leaves what the model's own does: a filter of 1.6
-    Hz, q / n^2 = (10 rad/s)^2.
-    """
-    belief = load_belief("identified")
-    fixed = settled_filters(belief, RATES, order=1, q=np.array([1e-12]))
-    mhd = belief["mhd_ars"].output_noise ** 2
-    found = fixed.coloured_variance([None, lambda freq: np.full(freq.shape, mhd)])
-    assert found[0, 0] == 0.0
-    # Ten points per decade of a crossover of first order: 1 %; what passes above 100 Hz: less.
-    assert found[1, 0] == pytest.approx(fixed.noise_variance()[1, 0], rel=0.02, abs=0.0)
-    more = optimum(belief, RATES, [(1.0, DEG)], excess={"mhd_ars": lambda freq: mhd * 0.1 / freq})
-    assert more.rmse > optimum(belief, RATES, [(1.0, DEG)]).rmse
-
-
 def test_a_sensor_without_output_noise_is_refused() -> None:
     belief = {"mems_gyro": SensorBelief(numerator=(1.0,), denominator=(1.0, 1.0), input_noise=1e-5)}
     with pytest.raises(ValueError, match="belief: expected an output_noise"):

@@ -116,7 +116,7 @@ def test_without_adaptation_it_is_the_kalman_filter(readings: dict[str, FloatArr
     neutral = ArwShakf(default_belief(), RATES, ArwShakfParameters(adapt=(), R0={}, bands={}, alpha=0.0, q=q)).process(
         readings
     )
-    plain = Kalman(default_belief(), RATES, KalmanParameters()).process(readings)
+    plain = Kalman(default_belief(), RATES, KalmanParameters(coloured=False)).process(readings)
     assert np.array_equal(neutral.rate, plain.rate)
     assert np.array_equal(neutral.std, plain.std)
 

@@ -72,7 +72,7 @@ def test_without_adaptation_it_is_the_kalman_filter(readings: dict[str, FloatArr
     neutral = Shakf(default_belief(), RATES, ShakfParameters(adapt=(), R0={}, q=q, use_input_noise=True)).process(
         readings
     )
-    plain = Kalman(default_belief(), RATES, KalmanParameters()).process(readings)
+    plain = Kalman(default_belief(), RATES, KalmanParameters(coloured=False)).process(readings)
     assert np.array_equal(neutral.rate, plain.rate)
     assert np.array_equal(neutral.std, plain.std)
 
@@ -80,7 +80,7 @@ def test_without_adaptation_it_is_the_kalman_filter(readings: dict[str, FloatArr
 def test_R_stays_above_its_floor_and_hits_are_counted(readings: dict[str, FloatArray]) -> None:
     still = {key: np.zeros_like(value) for key, value in readings.items()}  # no innovation at all: (17) goes negative
     floor = 1e-9 * DEG**2
-    block = Shakf(default_belief(), RATES, ShakfParameters(R_floor=floor)).process(still)
+    block = Shakf(default_belief(), RATES, ShakfParameters(R_floor=floor, gate=False)).process(still)
     for name in RATES:
         R = block.diagnostics[f"R_{name}"]
         # The very first reading is used with R0.

@@ -14,7 +14,7 @@ from testbed.fusion.filters.complementary import Complementary
 from testbed.fusion.model import build_model
 from testbed.fusion.two_paths.base import TwoPathParameters
 from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass, parallel
-from testbed.fusion.two_paths.kernel import VARIANCE
+from testbed.fusion.two_paths.kernel import DENSITY, VARIANCE
 from testbed.fusion.two_paths.noise import noise_variance
 
 DEG = np.pi / 180.0
@@ -195,15 +195,19 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
 
 @pytest.mark.parametrize("cls", FILTERS)
 def test_drift_is_forgotten_once_the_slow_sensor_is_back(cls: Any) -> None:
-    """Its variance falls by exp(-2 w_c t), as the scalar Riccati equation has it near its end."""
+    """The scalar Riccati equation w' = w_c^2 - w^2 has the solution w_c coth(w_c t + c), p = N^2 w."""
     z = {"mems_gyro": np.zeros(10_000), "mhd_ars": np.zeros(100_000)}
-    whole = cls(QUICK, RATES, TwoPathParameters(crossover=0.5, gate=False, start="rest")).process(z).std
+    p = TwoPathParameters(crossover=0.5, gate=False, start="rest")
+    whole = cls(QUICK, RATES, p).process(z).std
     z["mems_gyro"][6500:8000] = np.nan
-    extra = cls(QUICK, RATES, TwoPathParameters(crossover=0.5, gate=False, start="rest")).process(z).std ** 2 - whole**2
+    found = cls(QUICK, RATES, p)
+    extra = found.process(z).std ** 2 - whole**2
     assert extra[79_999] > 0.0
-    w = np.pi
-    # 0.6 s after; the difference of two variances keeps some digits less.
-    assert extra[92_000] / extra[80_000] == pytest.approx(np.exp(-2.0 * w * 0.6), rel=1e-2)
+    density, w = found._setting[DENSITY], np.pi
+    start = np.arctanh(1.0 / (1.0 + extra[80_000] / (density * w)))
+    for later in (1_000, 12_000):
+        wanted = density * w * (1.0 / np.tanh(w * later / 20_000.0 + start) - 1.0)
+        assert extra[80_000 + later] == pytest.approx(wanted, rel=1e-3)
 
 
 def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> None:
