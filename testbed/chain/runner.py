@@ -18,6 +18,7 @@ from testbed.runs.attributes import provenance
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.netcdf import NetcdfStore
 from testbed.runs.results import MemoryStore
+from testbed.runs.size import disk_bytes, require_space
 from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
@@ -122,6 +123,8 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
             )
         )
         for part in blocks:
+            if not part.start:
+                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time))
             reach(part.start / chain.rates["base"])
             for sink in (netcdf, judge, recording):
                 sink.write(part)

@@ -65,6 +65,21 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
     for key, value in understood(scenario).items():
         keys.add_row(key, value["written"], value["si"])
     console.print(keys)
+    print_sheets(console, scenario)
+    print_facts(console, facts)
+    console.print("The scenario is valid.")
+
+
+def print_sheets(console: Console, scenario: Scenario) -> None:
+    """Print what the words of data sheets became, and what each sensor is in those words.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    scenario : Scenario
+        Whose sensors.
+    """
     for name, steps in translations(scenario).items():
         words = ruled("data sheet", "as written", "rule", "becomes", title=f"{name}: translated")
         for step in steps:
@@ -76,11 +91,18 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
             for row in rows:
                 sheet.add_row(*row)
             console.print(sheet)
-    _print_facts(console, facts)
-    console.print("The scenario is valid.")
 
 
-def _print_facts(console: Console, facts: TableFacts) -> None:
+def print_facts(console: Console, facts: TableFacts) -> None:
+    """Print what is known of the turntable before the run.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    facts : TableFacts
+        What is known.
+    """
     modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
     torque = f"required torque {facts.required_torque:.4g} N m"
     if facts.torque_limit is not None:

@@ -86,7 +86,8 @@ class Judge:
             "prior_floor_rmse_deg_s": in_deg(bounds.prior_floor(frame.bandwidth, frame.no_rate_below)),
         }
         settled, why = self._settled(bounds)
-        psds = {} if bounds.reason else bounds.densities
+        # A band that no sensor sees (the nulls of a mean over an interval) has no floor either.
+        psds = bounds.densities if floors["floor_rmse_deg_s"] is not None else {}
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
@@ -174,8 +175,8 @@ class Judge:
 
 
 def in_deg(rate: float | None) -> float | None:
-    """Return a rate [rad/s] in deg/s, None for None."""
-    return None if rate is None else float(np.rad2deg(rate))
+    """Return a rate [rad/s] in deg/s, None where there is none."""
+    return None if rate is None or not np.isfinite(rate) else float(np.rad2deg(rate))
 
 
 def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.logs.clock import NANO, Tally, TimeBase
+from testbed.logs.plan import ROTATIONS
 from testbed.logs.reader import stamp_scans
 from testbed.logs.values import Values, ValueScan, word_size
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from testbed.logs.table import Table
 
 _PLACES = 5
+_GYRO = re.compile(r"gyr|rate|omega|\bw\b|^[grw]_?[xyz]$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
             yield Finding("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
     if values.n_missing:
         yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
+    if not _turns(one):
+        return
     if values.repeats > 1.0:
         yield Finding("repeats", f"each value stands {values.repeats:.3g} times in {one.label}: the sensor is slower")
     limit = None if one.largest is None else one.largest / abs(one.factor)
@@ -136,6 +141,14 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
         yield Finding(
             "rounding", f"{one.label} is rounding: words of {values.word:.4g}, noise of less than half a word"
         )
+
+
+def _turns(one: Plan) -> bool:
+    """Return whether a channel is a rate or an angle, by its unit or, without one, by its name.
+
+    A thermometer stands still at its highest word, a flag has two values, and both are as they should be.
+    """
+    return one.quantity in ROTATIONS or (not one.quantity and _GYRO.search(one.name) is not None)
 
 
 def _of_time(table: Table, clock: TimeBase) -> Iterator[Finding]:

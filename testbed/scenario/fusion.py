@@ -153,9 +153,13 @@ class Fusion:
 
 
 def _labelled(one: SensorBelief) -> SensorBelief:
-    """Return a belief as written out, which bears the name of a shipped one only if it is that."""
+    """Return a belief as written out, which bears the name of a shipped one only if it is that.
+
+    Where the noise of the sensor is off, the scenario itself has taken its resolution away.
+    """
     try:
-        shipped = one in load_belief(one.source).values()
+        known = load_belief(one.source).values()
     except ValueError:
-        shipped = False
+        known = {}.values()
+    shipped = any(one in (each, each.model_copy(update={"resolution": None})) for each in known)
     return one if shipped else one.model_copy(update={"source": "given"})

@@ -35,14 +35,11 @@ class Peaks:
         Largest torque that it asks of the motor [N m].
     places : tuple of 3 int
         Base steps of the largest rate, torque and third derivative of the rate.
-    played : int
-        Base steps that were looked at: all of them, or windows spread evenly over the run.
     """
 
     rate: float
     torque: float
     places: tuple[int, int, int]
-    played: int
 
 
 def command_peaks(scenario: Scenario) -> Peaks:
@@ -60,9 +57,8 @@ def command_peaks(scenario: Scenario) -> Peaks:
     RunError
         If the motion of a plug-in fails.
     """
-    motion, peaks, places, played = scenario.profile(), [0.0, -1.0, -1.0], [0, 0, 0], 0
-    terms = sum(part.n_term() for _, part in scenario.motion)
-    for start, n_time in windows(scenario.n_time, _STEP + terms):
+    motion, peaks, places = scenario.profile(), [0.0, -1.0, -1.0], [0, 0, 0]
+    for start, n_time in windows(scenario.n_time, _cost(scenario)):
         command = motion.peek(n_time, start)
         if not (np.isfinite(command.rate).all() and np.isfinite(command.rate_mid).all()):
             msg = f"expected a finite rate, got one that is not, from t = {start / scenario.base_rate_hz:g} s on"
@@ -71,8 +67,22 @@ def command_peaks(scenario: Scenario) -> Peaks:
         for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
             if measure.size and float(np.max(measure)) > peaks[i]:
                 peaks[i], places[i] = float(np.max(measure)), start + int(np.argmax(measure))
-        played += n_time
-    return Peaks(peaks[0], max(peaks[1], 0.0), (places[0], places[1], places[2]), played)
+    return Peaks(peaks[0], max(peaks[1], 0.0), (places[0], places[1], places[2]))
+
+
+def played(scenario: Scenario) -> int:
+    """Return how many base steps of a run `command_peaks` looks at.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Whose motion.
+    """
+    return sum(n_time for _, n_time in windows(scenario.n_time, _cost(scenario)))
+
+
+def _cost(scenario: Scenario) -> int:
+    return _STEP + sum(part.n_term() for _, part in scenario.motion)
 
 
 def windows(n_time: int, cost: int) -> Iterator[tuple[int, int]]:

@@ -130,9 +130,15 @@ class Fog(Sensor, GyroTerms):
         return density
 
     def sheet_belief(self) -> dict[str, Any]:
-        """Return low-pass and white noise on the reading; see `Sensor.sheet_belief`."""
+        """Return low-pass and noise on the reading; see `Sensor.sheet_belief`."""
         numerator, denominator = self.transfer_function
-        return {"numerator": numerator, "denominator": denominator, "output_noise": self.angle_random_walk}
+        return {
+            "numerator": numerator,
+            "denominator": denominator,
+            "output_noise": self.angle_random_walk,
+            "range": self.range,
+            **self.slow_terms(),
+        }
 
     def datasheet(self) -> list[tuple[str, str]]:
         """Return noise and thermal coefficients in data-sheet units; see `Sensor.datasheet`."""

@@ -170,7 +170,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
         return density
 
     def sheet_belief(self) -> dict[str, Any]:
-        """Return low-pass, white noise before it and rounding behind it; see `Sensor.sheet_belief`."""
+        """Return low-pass, noise before it and rounding behind it; see `Sensor.sheet_belief`."""
         numerator, denominator = self.transfer_function
         rounding = rounding_psd(self.resolution, self.sample_rate) ** 0.5
         return {
@@ -179,6 +179,10 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
             "input_noise": self.angle_random_walk,
             # Of a fine word it keeps R positive and changes nothing.
             "output_noise": max(rounding, 3e-4 * self.angle_random_walk),
+            "turn_on_bias": self.turn_on_bias,
+            "range": self.full_scale(),
+            "resolution": 1.0 / self.sensitivity,
+            **self.slow_terms(),
         }
 
     def output_rms(self) -> float:

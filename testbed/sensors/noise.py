@@ -99,6 +99,14 @@ class GyroTerms(Part):
         )
         return density
 
+    def slow_terms(self) -> dict[str, float]:
+        """Return flicker and random walk, which a belief has under the same names."""
+        return {
+            "bias_instability": self.bias_instability,
+            "rate_random_walk": self.rate_random_walk,
+            "lowest_frequency": self.lowest_frequency,
+        }
+
     def allan_variance(self, tau: float) -> float:
         r"""Return the expected Allan variance of the sum of the terms, the ramp included.
 

@@ -165,7 +165,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path, how):
 
 
 def test_check_prints_what_was_written_and_what_was_understood(tmp_path):
-    result = call("check", short_file(tmp_path), cwd=tmp_path)
+    result = call("check", short_file(tmp_path), "--all", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     row = next(line for line in result.stdout.splitlines() if "motion.0.sine.rate" in line)
     assert "1 deg/s" in row

@@ -232,12 +232,12 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         ),
         (
             ["audit", "{missing}", "{unseen}"],
-            "missing: expected a model that `testbed compensate train` wrote: No such file",
+            "missing: cannot be read: No such file",
         ),
         (["audit", "{model}", "{slow}", "--rate", "0.005"], "expected at least one reading in 100 s"),
         (["apply", "{table}", "{unseen}"], "expected a model that `testbed compensate train` wrote"),
-        (["apply", "{missing}", "{unseen}"], "expected a model that `testbed compensate train` wrote"),
-        (["audit", "{other}", "{unseen}"], "expected format 'testbed drift model'"),
+        (["apply", "{missing}", "{unseen}"], "cannot be read: No such file"),
+        (["audit", "{other}", "{unseen}"], "format: input should be 'testbed drift model'"),
         (["audit", "{model}", "{short}", "--rate", "0.1"], "so that a slow rate can be told from drift"),
     ],
 )

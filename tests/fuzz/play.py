@@ -9,7 +9,7 @@ import resource
 import signal
 import time
 import traceback
-import warnings
+import warnings as python_warnings
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 
@@ -53,13 +53,14 @@ def within(seconds):
 
 
 def check(path):
-    """Do what `testbed check` does."""
-    from testbed.cli.understood import doubts, print_scenario, scenario_document
+    """Do what `testbed check` does before it tries a first block, which may have to compile a kernel of a new size."""
+    from testbed.cli.check_page import warnings
+    from testbed.cli.understood import print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
     from testbed.scenario.loader import load_scenario
 
     scenario = load_scenario(path)
-    doubts(scenario)
+    warnings(scenario)
     facts = table_facts(scenario)
     json.dumps(scenario_document(scenario, facts), allow_nan=False)
     print_scenario(scenario, facts)
@@ -81,8 +82,13 @@ def play(text, path, seconds=4 * MOST_SECONDS):
     begin, cpu, fault, outcome = time.monotonic(), time.process_time(), "", "accepted"
     before = memory()
     try:
-        with within(seconds), redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with (
+            within(seconds),
+            redirect_stdout(io.StringIO()),
+            redirect_stderr(io.StringIO()),
+            python_warnings.catch_warnings(),
+        ):
+            python_warnings.simplefilter("ignore")
             check(path)
     except ScenarioError as error:
         outcome, fault = "refused", message_fault(error)

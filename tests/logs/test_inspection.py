@@ -61,6 +61,17 @@ def test_each_fault_is_found(tmp_path):
     assert "backward" in kinds(reports(tmp_path, lines(back, DEG, head="t,w [deg/s]\n"))[0])
 
 
+def test_what_stands_still_as_it_should_has_no_finding(tmp_path):
+    """A thermometer in words of 0.1 degC, a flag, a counter, a channel that is held at a slower rate."""
+    k = np.arange(N_TIME)
+    heat = [f"{25.0 + round(k_ / 900) * 0.1:.1f}" for k_ in k]
+    held = [f"{np.sin(k_ // 50):.6f}" for k_ in k]
+    flag, count = list(map(str, k // 1500 % 2)), list(map(str, k))
+    text = lines(SECONDS, DEG, heat, flag, count, held, head="t,w [deg/s],T [degC],armed,loop,pressure\n")
+    for report in reports(tmp_path, text):
+        assert report.findings == (), report.plan.name
+
+
 @pytest.mark.property
 def test_blocks_give_the_same_values_as_the_whole():
     rng = np.random.default_rng(3)

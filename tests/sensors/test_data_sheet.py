@@ -241,6 +241,9 @@ def test_a_part_has_no_contradiction_and_a_belief_of_its_own_sheet(name: str) ->
     np.testing.assert_allclose(
         belief.realisation().response(freq), transfer(list(numerator), list(denominator), freq), rtol=1e-9
     )
+    slow = ("bias_instability", "rate_random_walk", "lowest_frequency")
+    assert [getattr(belief, key) for key in slow] == [getattr(sensor, key) for key in slow]
+    assert belief.range == sensor.full_scale()
     # Its white noise is the sheet's: 1/f of 10 deg/h beside 3.8 mdps/sqrt(Hz) is 3.9 % of it at 10 Hz and less above.
     power = np.abs(belief.realisation().response(freq)) ** 2
     claimed = belief.input_noise**2 * power + belief.output_noise**2

@@ -10,6 +10,7 @@ import typer
 
 from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, expanded
 from testbed.cli.status import MISSED
+from testbed.errors import Problem, RunError, ScenarioError
 
 
 @expanded
@@ -26,15 +27,17 @@ def run(
     allow_outside: AllowOutside = False,
 ) -> None:
     """Run a scenario, print its errors and write the run folder."""
+    from testbed.chain.forecast import forecast
     from testbed.chain.runner import run as run_scenario
+    from testbed.cli.check_page import size_words, warnings
     from testbed.cli.terminal import print_metrics
-    from testbed.cli.understood import doubts
     from testbed.logs.options import quantity
     from testbed.scenario.loader import load_scenario
 
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
-    output.warn(doubts(loaded))
+    output.warn(warnings(loaded))
+    output.note(f"{loaded.name}: {size_words(forecast(loaded))}")
     target = out or Path("runs") / loaded.name
     with output.progress(loaded.name, loaded.frame.duration) as tick:
         result = run_scenario(loaded, out=target, seed=seed, block=length, progress=tick)
@@ -50,17 +53,34 @@ def run(
 
 @expanded
 def check(
-    scenario: ScenarioFile, output: Output, plugin: PluginModules = None, allow_outside: AllowOutside = False
+    scenario: ScenarioFile,
+    output: Output,
+    everything: Annotated[bool, typer.Option("--all", help="Print every key, as written and in SI.")] = False,
+    plugin: PluginModules = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Validate a scenario and print what was understood."""
-    from testbed.cli.understood import doubts, print_scenario, scenario_document
+    from testbed.chain.forecast import forecast
+    from testbed.cli.check_page import print_page, size_document, warnings
+    from testbed.cli.understood import print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
+    from testbed.scenario.departures import departures
     from testbed.scenario.loader import load_scenario
 
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
-    output.warn(doubts(loaded))
-    facts = table_facts(loaded)
-    output.show(scenario_document(loaded, facts), lambda: print_scenario(loaded, facts))
+    output.warn(warnings(loaded))
+    try:
+        size = forecast(loaded)
+    except RunError as error:
+        raise ScenarioError([Problem(f"the run would fail at its beginning: {error}", file=loaded.file)]) from error
+    facts = table_facts(loaded, size.step)
+    document = {
+        **scenario_document(loaded, facts),
+        "differs": departures(loaded),
+        "forecast": size_document(size),
+    }
+    show = (lambda: print_scenario(loaded, facts)) if everything else lambda: print_page(loaded, facts, size)
+    output.show(document, show)
 
 
 def schema() -> None:

@@ -181,6 +181,8 @@ class _Search:
             noise += weight * (0.5 * (low + high) - (high - low) / (2.0 * _HALF_STEP))
             error = filters.line_error(self._freq, self._truth) ** 2 * self._power @ self._of_signal
             lag += weight * 0.5 * (error[: q.size] + error[q.size :])
+        # Where the start's covariance swamps what is left of it, rounding may leave less than nothing: no candidate.
+        noise = np.where(noise > 0.0, noise, np.inf)
         at = np.argmin(noise[:, None] + lag, axis=0)
         return [_bound(noise[i], lag[i, k], order, q[i]) for k, i in enumerate(at)]
 

@@ -56,8 +56,8 @@ def test_at_10_hz_the_mhd_sensors_defect_forces_its_own_error() -> None:
         found = split(rate, "10 Hz", case, 2, PROTOCOL)
         forced = abs(defect - 1.0) / np.sqrt(2.0)
         for name in ("kalman", "arw_shakf"):
-            # The lag and the misfit of (39), the clean belief error, add as phasors: the sum lies between both ends.
-            assert abs(found[name].belief - forced) <= clean[name].belief
+            # The lag and the misfit of (39), the clean belief error c, add as phasors to d - 1 as d c: d (1 + c) - 1.
+            assert abs(found[name].belief - forced) <= abs(defect) * clean[name].belief
             row = dict(
                 zip(
                     ("rmse", "lowest", "highest", "aligned", "belief", "noise", "closure"),
