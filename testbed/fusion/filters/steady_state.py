@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from testbed.fusion.analysis.even import EvenDesign, most_even
-from testbed.fusion.analysis.optimum import Optimum, optimum
+from testbed.fusion.analysis.optimum import optimum
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
 from testbed.fusion.kernels.covariance import COUNTS, EVERY, settling_kernel
 from testbed.fusion.model import build_model
@@ -31,22 +30,22 @@ class SteadyStateParameters(CommonParameters):
 
     Parameters
     ----------
-    frequency : float, optional
-        Of a sine [Hz]; left out: no frequency from 0.1 to 500 Hz is to cost much more than its optimum.
+    frequency : float
+        Of a sine [Hz].
     amplitude : float
-        Of the sine [rad/s].
+        Of that sine [rad/s].
     coloured : bool
         Give the belief's slow noise (1/f, turn-on bias, rate random walk) states of its own.
     """
 
-    frequency: Frequency | None = None
+    frequency: Frequency = 10.0
     amplitude: Range = math.radians(1.0)
     coloured: Switch = True
 
 
 class SteadyState(BlockFilter):
     r"""Kalman filter that stops computing its covariance once it has settled, order and q those of the `optimum` of a
-    sine, or the ones that no sine makes much worse than its own.
+    sine.
 
     .. math:: x^- = F x, \quad x = x^- + K_p (z - H x^-)
 
@@ -80,11 +79,7 @@ class SteadyState(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        best: Optimum | EvenDesign
-        if parameters.frequency is None:
-            best = most_even(belief, sample_rate_hz, parameters.amplitude)
-        else:
-            best = optimum(belief, sample_rate_hz, [(parameters.frequency, parameters.amplitude)])
+        best = optimum(belief, sample_rate_hz, [(parameters.frequency, parameters.amplitude)])
         self.model = build_model(
             belief,
             sample_rate_hz,

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from testbed.fusion.analysis.even import most_even
-from testbed.fusion.analysis.optimum import optimum, settled_filters
+from testbed.fusion.analysis.optimum import optimum
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.filters.steady_state import SteadyState, SteadyStateParameters
@@ -39,9 +38,7 @@ def both(readings: dict[str, FloatArray]) -> tuple[EstimateBlock, EstimateBlock]
     """Return the settling filter and the Kalman filter of its model."""
     best = optimum(QUICK, RATES, [(10.0, DEG)])
     kalman = Kalman(QUICK, RATES, KalmanParameters(order=best.order, q=best.q, coloured=False))
-    return SteadyState(QUICK, RATES, SteadyStateParameters(frequency=10.0, coloured=False)).process(
-        readings
-    ), kalman.process(readings)
+    return SteadyState(QUICK, RATES, SteadyStateParameters(coloured=False)).process(readings), kalman.process(readings)
 
 
 @pytest.mark.oracle
@@ -82,7 +79,7 @@ def test_the_cycle_of_gains_follows_the_clock_and_not_the_first_reading() -> Non
     late = {key: values.copy() for key, values in readings.items()}
     late["mhd_ars"][:13], late["mems_gyro"][:2] = np.nan, np.nan
     whole, begun = (
-        SteadyState(QUICK, RATES, SteadyStateParameters(frequency=10.0, coloured=False, gate=False)).process(one)
+        SteadyState(QUICK, RATES, SteadyStateParameters(coloured=False, gate=False)).process(one)
         for one in (readings, late)
     )
     assert np.unique(whole.std[-100:]).size == 10
@@ -105,27 +102,6 @@ def test_amplitude_opens_the_filter(reference: Any) -> None:
     readings = reference.readings(reference.sines((10.0, 1.0), duration=0.2), 8)
     belief = load_belief("eq39")
     small, large = (
-        SteadyState(belief, RATES, SteadyStateParameters(frequency=10.0, amplitude=a * DEG)).process(readings)
-        for a in (0.01, 10.0)
+        SteadyState(belief, RATES, SteadyStateParameters(amplitude=a * DEG)).process(readings) for a in (0.01, 10.0)
     )
     assert large.std[-1] > small.std[-1]
-
-
-@pytest.mark.oracle
-def test_without_a_frequency_no_sine_costs_much_more_than_its_optimum() -> None:
-    """The largest ratio over 0.1 to 500 Hz, by the optima of single sines; any one sine's own design has a larger."""
-    belief = load_belief("eq39")
-    even = most_even(belief, RATES, DEG)
-    frequencies = (0.1, 1.0, 10.0, 100.0, 500.0)
-
-    def ratios(order: int, q: float) -> list[float]:
-        filters = settled_filters(belief, RATES, order=order, q=np.array([q]))
-        truth = np.array([belief[name].realisation().response(np.array(frequencies)) for name in RATES])
-        lag = filters.line_error(np.array(frequencies), truth)[0] ** 2 * DEG**2 / 2.0
-        errors = np.sqrt(filters.noise_variance().sum() + lag)
-        return [e / optimum(belief, RATES, [(f, DEG)]).rmse for e, f in zip(errors, frequencies, strict=True)]
-
-    assert max(ratios(even.order, even.q)) <= even.largest_ratio * (1.0 + 1e-9)
-    for frequency in (0.1, 10.0, 500.0):
-        own = optimum(belief, RATES, [(frequency, DEG)])
-        assert max(ratios(own.order, own.q)) >= max(ratios(even.order, even.q))
