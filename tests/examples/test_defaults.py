@@ -61,9 +61,7 @@ def test_identified_belief_is_what_the_example_writes():
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="the shipped belief was not swept again since the sensors changed how they start and draw their noise"
-)
+@pytest.mark.xfail(reason="the shipped belief was not swept again since start and noise of the sensors changed")
 def test_swept_belief_is_what_the_sweep_gives_and_near_the_sensors():
     """White noise of density N = 0.0025 deg/s/rtHz before the gyro leaves N sqrt(2/T)/A = 0.11 % in each part of a
     point of T = 10 s.
