@@ -21,6 +21,12 @@ def shortened(text: str) -> str:
     return text if len(text) <= MOST_QUOTED else f"{text[: MOST_QUOTED - 3]}..."
 
 
+def shortened_path(path: object) -> str:
+    """Return a path for a message: of a long one the end, which tells files apart."""
+    text = str(path)
+    return text if len(text) <= MOST_QUOTED else f"...{text[3 - MOST_QUOTED :]}"
+
+
 def quoted(value: Any) -> str:
     """Return a value that a user gave as a message shows it, at most 80 characters.
 

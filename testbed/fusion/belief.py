@@ -25,6 +25,8 @@ Coefficient = Annotated[float, Field(allow_inf_nan=False)]
 Coefficients = Annotated[tuple[Coefficient, ...], Field(max_length=33)]
 
 _CLOSEST_POLES = 1e-3
+# Readings are rates in rad/s, so a gain far from 1 is a mistake of units at least.
+_LEAST_GAIN, _HIGHEST_HZ = 1e-12, 1e4
 
 
 @dataclass(frozen=True)
@@ -100,8 +102,19 @@ class SensorBelief(Part):
 
     @model_validator(mode="after")
     def _check(self) -> SensorBelief:
-        self.realisation()
+        largest = self.largest_gain()
+        if not _LEAST_GAIN <= largest <= 1.0 / _LEAST_GAIN:
+            msg = (
+                f"numerator: expected readings of the size of the rate, got a largest gain of {largest:g} between "
+                f"{self.lowest_frequency:g} and {_HIGHEST_HZ:g} Hz; the reading is a rate in rad/s"
+            )
+            raise ValueError(msg)
         return self
+
+    def largest_gain(self) -> float:
+        """Return the largest |G| between the lowest frequency and 10 kHz [-]."""
+        freq = np.geomspace(self.lowest_frequency, _HIGHEST_HZ, 81)
+        return float(np.max(np.abs(self.realisation().response(freq))))
 
     @property
     def n_pole(self) -> int:

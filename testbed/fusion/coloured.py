@@ -165,8 +165,7 @@ def slow_noise(belief: SensorBelief) -> SlowNoise:
         If there is 1/f noise and no white noise beside it.
     """
     lowest = belief.lowest_frequency
-    passed = float(np.max(np.abs(belief.realisation().response(np.geomspace(lowest, _HIGHEST_HZ, 81)))))
-    white = belief.input_noise**2 + (belief.output_noise / passed) ** 2
+    white = belief.input_noise**2 + (belief.output_noise / belief.largest_gain()) ** 2
     inner = fit_markov(belief.inner_slow_density, white, lowest)
     outer = fit_markov(belief.outer_slow_density, belief.output_noise**2, lowest)
     walk = belief.rate_random_walk**2

@@ -6,7 +6,7 @@ import os
 import stat
 from typing import TYPE_CHECKING
 
-from testbed.errors import Problem, ScenarioError, shortened
+from testbed.errors import Problem, ScenarioError, shortened_path
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def read_bytes(path: Path, most: int, what: str) -> bytes:
             content = stream.read(most + 1) if stat.S_ISREG(mode) else None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise ScenarioError([Problem(f"cannot be read: {reason}", file=shortened(str(path)))]) from error
+        raise ScenarioError([Problem(f"cannot be read: {reason}", file=shortened_path(path))]) from error
     if content is None:
         raise ScenarioError([Problem(f"expected {what} in a regular file, got a device or a pipe", file=str(path))])
     if len(content) > most:

@@ -124,3 +124,9 @@ def test_load_belief_takes_names_and_mappings() -> None:
 def test_load_belief_gives_a_mapping_of_its_own() -> None:
     load_belief("eq39").clear()
     assert set(load_belief("eq39")) == {"mems_gyro", "mhd_ars"}
+
+
+@pytest.mark.parametrize("numerator", [(), (0.0, 0.0), (1e-320,), (1e300,)])
+def test_a_sensor_that_passes_nothing_is_refused(numerator):
+    with pytest.raises(ValueError, match="numerator: expected readings of the size of the rate"):
+        SensorBelief(numerator=numerator, denominator=(0.001, 1.0), output_noise=1e-4)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from testbed.errors import MOST_QUOTED, ScenarioError, UnknownNameError, quoted, shortened
+from testbed.errors import MOST_QUOTED, ScenarioError, UnknownNameError, quoted, shortened, shortened_path
 from testbed.inputs.files import read_bytes
 from testbed.inputs.tree import MOST_BYTES, MOST_CHARACTERS, MOST_DEPTH, MOST_DIGITS, MOST_NODES, read_yaml
 
@@ -208,3 +208,11 @@ def test_quoted_shows_at_most_80_characters(value):
 
 def test_an_unknown_name_is_quoted_short():
     assert "x" * 81 not in str(UnknownNameError("filter", "x" * 100_000, ["kalman"]))
+
+
+def test_a_long_path_keeps_its_end():
+    shown = shortened_path("/home/" + "deep/" * 60 + "log.csv")
+    assert shown.startswith("...")
+    assert shown.endswith("/deep/log.csv")
+    assert len(shown) == MOST_QUOTED
+    assert shortened_path("log.csv") == "log.csv"
