@@ -44,7 +44,7 @@ class TookTooLongError(BaseException):
 
 @contextmanager
 def within(seconds):
-    """Give up after so much time of this process, or six times as much on the clock: others may have the machine too."""
+    """Give up after so much time of this process, or six times as much on the clock: others have the machine too."""
 
     def ring(_signal, _frame):
         raise TookTooLongError
