@@ -65,7 +65,6 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(HERE.parent / "examples" / "gallery")],
     "gallery_dirs": ["gallery"],
     "abort_on_example_error": True,
-    "run_stale_examples": True,
     "download_all_examples": False,
     "show_memory": False,
     "show_signature": False,
