@@ -12,6 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from testbed.errors import quoted, shortened
 from testbed.logs.names import clean_unit, quantity_of
 from testbed.logs.options import refusal
 from testbed.logs.ornaments import Ornaments, find_ornaments
@@ -221,7 +222,9 @@ def _lines(path: Path, head: bytes, encoding: str, *, complete: bool) -> list[tu
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
     except (UnicodeDecodeError, LookupError) as error:
-        raise refusal(path, f"cannot be read: {error}; which encoding is it?", key="--encoding") from error
+        raise refusal(
+            path, f"cannot be read: {shortened(str(error))}; which encoding is it?", key="--encoding"
+        ) from error
     lines = text.removeprefix("\ufeff").splitlines()
     if not complete:
         lines = lines[:-1]
@@ -236,9 +239,9 @@ def _marks(path: Path, lines: list[str], options: TextOptions) -> tuple[str, str
     """Return the separator and the decimal mark that read most fields as numbers."""
     given = _WORDS.get(options.separator or "", options.separator)
     if given is not None and given not in _SEPARATORS:
-        raise refusal(path, f"expected one of , ; | tab blank, got {options.separator!r}", key="--separator")
+        raise refusal(path, f"expected one of , ; | tab blank, got {quoted(options.separator)}", key="--separator")
     if options.decimal not in {None, ".", ","}:
-        raise refusal(path, f"expected . or , got {options.decimal!r}", key="--decimal")
+        raise refusal(path, f"expected . or , got {quoted(options.decimal)}", key="--decimal")
     choices = []
     for rank, separator in enumerate(_SEPARATORS if given is None else [given]):
         for decimal in ".," if options.decimal is None else options.decimal:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 
 from testbed import units
 from testbed.document import Document
+from testbed.errors import quoted
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
 from testbed.logs.selection import TextOptions
@@ -81,7 +82,7 @@ class TimeMap(Part):
         try:
             return int(np.datetime64(self.epoch.removesuffix("Z"), "ns").astype(np.int64))
         except ValueError as error:
-            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {self.epoch!r}"
+            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {quoted(self.epoch)}"
             raise ValueError(msg) from error
 
 
@@ -206,7 +207,7 @@ def unit_quantity(unit: str) -> str:
     """
     found = quantity_of(unit)
     if not found:
-        msg = f"{unit!r} is no unit of a channel; expected one such as 'deg/s', 'arcsec' or 'degC'"
+        msg = f"{quoted(unit)} is no unit of a channel; expected one such as 'deg/s', 'arcsec' or 'degC'"
         raise ValueError(msg)
     return found
 
@@ -223,10 +224,10 @@ def measure(text: str) -> tuple[float, str]:
     try:
         value = float(number)
     except ValueError as error:
-        msg = f"expected a number and a unit, such as '0.07 deg/s', got {text!r}"
+        msg = f"expected a number and a unit, such as '0.07 deg/s', got {quoted(text)}"
         raise ValueError(msg) from error
     if not unit.strip():
-        msg = f"expected a number and a unit, such as '0.07 deg/s', got {text!r}: the unit is missing"
+        msg = f"expected a number and a unit, such as '0.07 deg/s', got {quoted(text)}: the unit is missing"
         raise ValueError(msg)
     kind = unit_quantity(unit.strip())
     return value * units.parse(f"1 {unit}", QUANTITIES[kind]), kind
