@@ -118,11 +118,19 @@ def _table(entry: Mapping[str, Any], text: str) -> str:
         said.update(dict.fromkeys(one.name.split(", "), " ".join(one.desc)))
     rows = [
         f"| `{name}` | {_cell(said.get(name, ''))} | {_cell(_kind(value))} | {_default(name, value, entry)} |"
-        for name, value in entry.get("properties", {}).items()
+        for name, value in _properties(entry).items()
     ]
     if not rows:
         return "No keys.\n"
     return "\n".join(["| key | what it is | value | default |", "|---|---|---|---|", *rows, ""])
+
+
+def _properties(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a part, of all its forms if it has several."""
+    found = dict(entry.get("properties", {}))
+    for one in entry.get("anyOf", ()):
+        found |= {name: value for name, value in one.get("properties", {}).items() if name not in found}
+    return found
 
 
 def _cell(text: str) -> str:
