@@ -54,7 +54,7 @@ def write_report(run_dir: Path) -> Path:
     return run_dir / REPORT
 
 
-def write_figures(run_dir: Path) -> list[Path]:
+def save_figures(run_dir: Path) -> list[Path]:
     """Write the figures of the report for papers and slides: ``figures/<name>.svg``, ``.pdf`` and ``.png``.
 
     Each is written beside and renamed, and the folder's manifest follows it; equal runs give equal files.

@@ -15,7 +15,7 @@ import pytest
 import testbed
 from testbed.errors import ScenarioError
 from testbed.pages.numbers import fixed, significant
-from testbed.report import run_figures, write_figures, write_report
+from testbed.report import run_figures, save_figures, write_report
 from testbed.report.digest import digest_run, zoom_window
 from testbed.runs.manifest import strangers
 from testbed.runs.metrics import RunMetrics
@@ -500,7 +500,7 @@ def test_figures_for_elsewhere_are_whole_known_to_the_manifest_and_repeatable(tm
     """Each is what its name says, a rerun may replace them, and equal runs give equal files."""
     run = testbed.run(testbed.Scenario.from_dict(SMALL), out=tmp_path / "run")
     assert run.folder is not None
-    written = write_figures(run.folder)
+    written = save_figures(run.folder)
     names = set(run_figures(run))
     assert {path.name for path in written} == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf", "png")}
     first = {path: path.read_bytes() for path in written}
@@ -509,6 +509,6 @@ def test_figures_for_elsewhere_are_whole_known_to_the_manifest_and_repeatable(tm
         assert content.startswith(start)
         assert content.rstrip().endswith({".svg": b"</svg>", ".pdf": b"%%EOF", ".png": b"IEND\xaeB`\x82"}[path.suffix])
     assert strangers(run.folder) == []
-    assert {path: path.read_bytes() for path in write_figures(run.folder)} == first
+    assert {path: path.read_bytes() for path in save_figures(run.folder)} == first
     testbed.run(testbed.Scenario.from_dict(SMALL), out=tmp_path / "run")
     assert not (tmp_path / "run" / "figures").exists()

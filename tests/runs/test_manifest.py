@@ -76,7 +76,7 @@ def test_a_missing_file_and_what_a_file_browser_leaves_are_no_obstacle(tmp_path)
 def test_a_refused_run_simulates_nothing(stored, tmp_path, monkeypatch):
     monkeypatch.setattr("testbed.chain.runner.simulate", None)
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(ScenarioError, match=r"no run folder of the testbed \(it has no manifest"):
+    with pytest.raises(ScenarioError, match=r"no folder of the testbed \(it has no manifest"):
         testbed.run(stored[0], out=tmp_path)
 
 

@@ -27,11 +27,11 @@ def report(
     ] = False,
 ) -> None:
     """Write the static report of a run again."""
-    from testbed.report import write_figures, write_report
+    from testbed.report import save_figures, write_report
     from testbed.runs.folder import failing_as_run_error
 
     with failing_as_run_error(str(run_dir)):
         page = write_report(run_dir)
-        drawn = write_figures(run_dir) if figures else []
+        drawn = save_figures(run_dir) if figures else []
     known = {"written": str(page), "figures": [str(path) for path in drawn]}
     output.show(known, lambda: typer.echo("\n".join(f"wrote {path}" for path in (page, *drawn))))
