@@ -16,6 +16,9 @@ from testbed.pointing.blend import Margins, butterworth_gains, loop_margins
 from testbed.units import Duration, Frequency, PositiveDuration, Quantity
 
 if TYPE_CHECKING:
+    from pydantic import GetJsonSchemaHandler
+    from pydantic_core import core_schema
+
     from testbed.pointing.blend import Gains
 
 PositiveAngle = Annotated[float, Quantity("rad", "20 urad", above=0.0)]
@@ -182,6 +185,12 @@ class Window(Part):
 
     length: PositiveDuration
     separation: PositiveDuration | None = None
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string", "description": "length", "examples": ["100 ms"]}, handler(schema)]}
 
     @model_validator(mode="before")
     @classmethod
