@@ -76,6 +76,7 @@ from testbed._version import __version__
 
 if TYPE_CHECKING:
     from testbed.chain.runner import run
+    from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
     from testbed.logs import read_log
@@ -96,6 +97,7 @@ __all__ = [
     "__version__",
     "belief_of",
     "estimate",
+    "line_of_sight",
     "list_filters",
     "list_motions",
     "list_presets",
@@ -117,6 +119,7 @@ _LAZY = {
     "UnknownNameError": "testbed.errors",
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
+    "line_of_sight": "testbed.chain.sight",
     "list_filters": "testbed.fusion",
     "list_motions": "testbed.models.motions",
     "list_presets": "testbed.sensors",
