@@ -16,7 +16,7 @@ from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
-from testbed.runs.table import error_unit
+from testbed.runs.table import error_unit, metric_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -120,6 +120,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         sight_rows=sight_rows(metrics),
         sight_metrics=[row.metric for row in metrics.expectations if _of_pointing(row.metric)],
         inside_rows=inside_rows,
+        metric_text=metric_text,
     )
 
 

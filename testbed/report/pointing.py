@@ -14,6 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
 from testbed.pages.numbers import plain, significant
 from testbed.pages.svg import INK, STYLE
+from testbed.runs.table import window_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -46,7 +47,7 @@ def sight_rows(metrics: RunMetrics) -> list[dict[str, Any]]:
         spectral = (sight.model_extra or {}).get("spectral", {}).get("rpe_urad", {})
         for key in sight.rpe_urad:
             errors = {kind: getattr(sight, f"{kind}_urad").get(key) for kind in ("rpe", "mpe", "pde", "pre")}
-            rows.append({"filter": name, "window": f"{float(key):g} s", "spectral": spectral.get(key), **errors})
+            rows.append({"filter": name, "window": window_text(key), "spectral": spectral.get(key), **errors})
     return rows
 
 

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import testbed
 from testbed.cli.app import app
 from tests.chain.test_pointing import aimed
+from tests.recording.test_writer import read
 
 OTHER = "tracker: {bandwidth: 5 Hz}\nmirror: {bandwidth: 1 kHz, latency: 0 s}\nwindows: [10 ms]\n"
 
@@ -70,3 +71,23 @@ def test_a_run_without_pointing_asks_for_one(tmp_path):
     with pytest.raises(testbed.ScenarioError, match="--pointing"):
         testbed.line_of_sight(out)
     assert testbed.line_of_sight(out, {"mirror": {"bandwidth": "2 kHz"}})["kalman"].residual_rms_urad > 0.0
+
+
+def test_the_report_has_the_design_page(folder):
+    """Requirement, budget and curves: the number of the table is that of metrics.json."""
+    page = (folder / "report.html").read_text()
+    own = testbed.open_run(folder).metrics.pointing["kalman"]
+    assert '<table id="sights">' in page
+    assert f'value="{own.residual_rms_urad}"' in page
+    assert "latency dominates" in page
+    assert {"sight_budget", "sight_curves"} <= set(testbed.open_run(folder).plot())
+
+
+def test_the_recording_has_residual_and_beam_spot(folder):
+    """The spot is the residual in urad, every 400th base sample."""
+    found = read(folder / "recording.rrd")
+    entities = {entity for entity, _ in found}
+    assert {"/pointing/kalman/residual", "/pointing/target/kalman"} <= entities
+    _, spots = found["/pointing/target/kalman", "Points2D:positions"]
+    residual = testbed.open_run(folder).pointing["kalman"].residual[::400]
+    assert_allclose(spots.reshape(-1, 2)[:, 0], 1e6 * residual, rtol=1e-6, atol=1e-9)
