@@ -13,6 +13,7 @@ from testbed.logs.choice import select
 from testbed.logs.inspection import remarks, word_of
 from testbed.logs.options import refusal
 from testbed.logs.selection import Selection
+from testbed.pages.palette import color_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,6 +42,8 @@ class Record:
         What the reader found, took for granted or left out.
     word : float
         To what the rate is rounded [rad/s]; 0 if not known.
+    signal : str
+        What it is of a run, such as ``fusion/kalman``, whose colour it has; empty: a sensor by its name.
     """
 
     name: str
@@ -49,6 +52,12 @@ class Record:
     content: str
     notes: tuple[str, ...] = ()
     word: float = 0.0
+    signal: str = ""
+
+    @property
+    def color(self) -> str:
+        """The colour of its name, whatever else is drawn beside it."""
+        return color_of(self.signal or f"sensors/{self.name}")
 
 
 def read(
@@ -148,7 +157,8 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         if not np.isfinite(noise).any():
             raise refusal(folder, "expected readings, got none", f"sensors.{name}")
         content = f"{name} of {scenario.name}, less its noise-free reading, from {scenario.frame.settle:g} s on"
-        records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content))
+        key = f"sensors/{name}"
+        records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content, signal=key))
     return records
 
 

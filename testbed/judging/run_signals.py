@@ -38,6 +38,7 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
     """
     run = RunRecord.open(folder)
     signals = {**run.sensors, **run.fusion, "truth": run.truth, "commanded": run.commanded}
+    keys = {name: f"{kind}/{name}" for kind in ("sensors", "fusion") for name in getattr(run, kind)}
     settle = float(run.metrics["settle_s"])
     records = []
     for name in wanted or [*run.sensors, *run.fusion]:
@@ -48,5 +49,6 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
         time = np.asarray(signals[name].time)
         rate_hz = (time.size - 1) / float(time[-1] - time[0])
         first = math.ceil(round((settle - float(time[0])) * rate_hz, 6))
-        records.append(Record(name, np.asarray(signals[name].rate)[max(first, 0) :], rate_hz, f"{name} of {folder}"))
+        rate = np.asarray(signals[name].rate)[max(first, 0) :]
+        records.append(Record(name, rate, rate_hz, f"{name} of {folder}", signal=keys.get(name, name)))
     return records

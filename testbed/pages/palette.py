@@ -18,6 +18,8 @@ FILTERS = ("#2f9e58", "#b565d8", "#e2553d", "#c2652a", "#d6588f")
 
 # What ships keeps its colour wherever it is shown; any other name has one of its own.
 NAMED = {
+    "commanded": COMMANDED,
+    "truth": TRUTH,
     "sensors/mhd_ars": SENSORS[0],
     "sensors/mems_gyro": SENSORS[1],
     "sensors/fog": SENSORS[2],
@@ -43,7 +45,7 @@ def color_of(key: str) -> str:
     Parameters
     ----------
     key : str
-        ``sensors/<name>`` or ``fusion/<name>``.
+        ``sensors/<name>``, ``fusion/<name>``, ``truth`` or ``commanded``.
     """
     if key in NAMED:
         return NAMED[key]
@@ -81,9 +83,8 @@ def series_colors(sensor_names: Sequence[str], fusion_names: Sequence[str]) -> d
     dict of str to str
         "#rrggbb" under the keys `commanded`, `truth`, `sensors/<name>` and `fusion/<name>`.
     """
-    colors = {"commanded": COMMANDED, "truth": TRUTH}
     keys = [*(f"sensors/{name}" for name in sensor_names), *(f"fusion/{name}" for name in fusion_names)]
-    return colors | {key: color_of(key) for key in keys}
+    return {key: color_of(key) for key in ("commanded", "truth", *keys)}
 
 
 def rgb(color: str) -> tuple[int, int, int]:

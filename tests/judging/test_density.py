@@ -7,11 +7,16 @@ import json
 import numpy as np
 import pytest
 
+import testbed
 from testbed.errors import ScenarioError
 from testbed.judging.allan_records import Record
 from testbed.judging.density import band_edges, difference, estimate_density
+from testbed.judging.density_figure import density_figure
+from testbed.judging.run_signals import run_records
+from testbed.pages.palette import series_colors
 from testbed.sensors.noise import GyroNoise
 from tests.cli.test_app import assert_clear, call
+from tests.scenes import short
 
 N, FS = 1e-4, 500.0
 
@@ -86,6 +91,28 @@ def test_a_difference_of_channels_has_the_sum_of_the_noises_and_no_common_signal
     assert np.array_equal(difference(first, fast).rate, first.rate - second.rate)
     with pytest.raises(ScenarioError, match="rates of a whole ratio"):
         difference(first, Record("odd", second.rate, 333.0, "odd"))
+
+
+def test_a_colour_belongs_to_a_name_whatever_stands_beside_it(tmp_path):
+    """That of the report, for the signals of a run; of a column, that of a sensor of its name."""
+    place = tmp_path / "run"
+    testbed.run(short(tmp_path), out=place)
+
+    def colors(wanted):
+        records = run_records(place, wanted)
+        top = density_figure([estimate_density(record) for record in records]).axes[0]
+        return dict(zip(wanted, (line.get_color() for line in top.get_lines()), strict=True))
+
+    names = ["mhd_ars", "arw_shakf", "truth", "kalman", "mems_gyro"]
+    drawn = colors(names)
+    assert drawn == colors(names[::-1])
+    assert drawn["kalman"] == colors(["kalman"])["kalman"]
+    known = series_colors(["mhd_ars", "mems_gyro"], ["kalman", "arw_shakf"])
+    keys = ["sensors/mhd_ars", "fusion/arw_shakf", "truth", "fusion/kalman", "sensors/mems_gyro"]
+    assert list(drawn.values()) == [known[key] for key in keys]
+    assert Record("mhd_ars", white().rate, FS, "a column").color == known["sensors/mhd_ars"]
+    first, second = run_records(place, ["kalman", "truth"])
+    assert difference(first, second).color == known["fusion/kalman"]
 
 
 @pytest.mark.parametrize(
