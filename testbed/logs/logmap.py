@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +14,7 @@ from testbed.document import Document
 from testbed.errors import quoted
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
+from testbed.logs.selection import TextOptions
 from testbed.parts import Part
 
 Kind = Literal["rate", "increment", "angle"]
@@ -144,8 +146,8 @@ class LogMap(Part):
         The recording, or its consecutive parts; relative to the map.
     channels : dict
         Channels by their name.
-    separator, decimal, encoding, skip : optional
-        How a text file is written, where that can be read in two ways.
+    separator, decimal, encoding, skip, missing, only, drop_faulty : optional
+        How a text file is written, where that can be read in two ways, and which of its lines are rows.
     """
 
     file: Location | list[Location] | None = None
@@ -154,6 +156,14 @@ class LogMap(Part):
     decimal: str | None = None
     encoding: str | None = None
     skip: Annotated[int, Field(ge=0)] | None = None
+    missing: str | None = None
+    only: str | None = None
+    drop_faulty: bool = False
+
+    @property
+    def text(self) -> TextOptions:
+        """How a text file is written."""
+        return TextOptions(**{part.name: getattr(self, part.name) for part in fields(TextOptions)})
 
 
 def load_map(path: Path) -> LogMap:

@@ -71,6 +71,8 @@ class Plan:
         What was taken for granted.
     contradictions : tuple of str
         What the file says otherwise.
+    average : int
+        Samples of which the mean is kept [-].
     """
 
     name: str
@@ -91,6 +93,7 @@ class Plan:
     largest: float | None
     assumed: tuple[str, ...]
     contradictions: tuple[str, ...]
+    average: int = 1
 
 
 def option_keys(field: str) -> str:
