@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.chain.pointing import LinesOfSight
 from testbed.errors import RunError
 from testbed.fusion import FILTERS
 from testbed.fusion.checked import CheckedFilter
@@ -74,6 +75,7 @@ class Chain:
             **rates,
             **dict.fromkeys(self._fusion, fastest),
         }
+        self._pointing = LinesOfSight(scenario, self.rates)
 
     def process(self, n_time: int) -> RunBlock:
         """Advance everything by `n_time` base samples."""
@@ -98,6 +100,7 @@ class Chain:
             if profile is not None:
                 profiles[name] = profile
         estimates = {name: estimated(stage, readings) for name, stage in self._fusion.items()}
+        rates = {name: estimate.rate for name, estimate in estimates.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         return RunBlock(
             command.start,
@@ -108,6 +111,7 @@ class Chain:
             profiles,
             temperatures={name: stage.temperature for name, stage in thermal.items()},
             drifts={name: stage.drift for name, stage in thermal.items()},
+            pointing=self._pointing.process(truth.rate, truth.sensor_rate, readings, rates),
         )
 
     def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:

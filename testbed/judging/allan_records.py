@@ -13,7 +13,6 @@ from testbed.logs.choice import select
 from testbed.logs.inspection import remarks, word_of
 from testbed.logs.options import refusal
 from testbed.logs.selection import Selection
-from testbed.pages.palette import color_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Record:
+class RateRecord:
     """A rate record.
 
     Parameters
@@ -43,7 +42,7 @@ class Record:
     word : float
         To what the rate is rounded [rad/s]; 0 if not known.
     signal : str
-        What it is of a run, such as ``fusion/kalman``, whose colour it has; empty: a sensor by its name.
+        ``sensors/<name>``, ``fusion/<name>``, ``truth`` or ``commanded`` of a run; empty of a recording.
     """
 
     name: str
@@ -54,15 +53,10 @@ class Record:
     word: float = 0.0
     signal: str = ""
 
-    @property
-    def color(self) -> str:
-        """The colour of its name, whatever else is drawn beside it."""
-        return color_of(self.signal or f"sensors/{self.name}")
-
 
 def read(
     source: Path, wanted: Selection | None = None, text: TextOptions | None = None, sensor: str | None = None
-) -> list[Record]:
+) -> list[RateRecord]:
     """Return the records that the command line asks for.
 
     Parameters
@@ -95,7 +89,7 @@ def read(
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
-def as_record(channel: LogChannel, name: str) -> Record:
+def as_record(channel: LogChannel, name: str) -> RateRecord:
     """Return a channel of a recording as a record: on an even grid, lost samples NaN.
 
     Parameters
@@ -114,10 +108,10 @@ def as_record(channel: LogChannel, name: str) -> Record:
     content = f"{channel.label} of {channel.table.path} ({'; '.join([channel.table.format, *channel.assumed])})"
     # The rounding of increments and angles is no noise of its own in each sample of the rate.
     word = word_of(channel) if channel.kind == "rate" else 0.0
-    return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
+    return RateRecord(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
 
 
-def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
+def read_run(folder: Path, sensor: str | None = None) -> list[RateRecord]:
     """Return what each sensor of a run read after settling, less what it reads of the same truth without noise.
 
     So neither the motion nor the sensor's dynamics show, on a moving table as at standstill.
@@ -131,7 +125,7 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
 
     Returns
     -------
-    list of Record
+    list of RateRecord
         In the order of the scenario.
 
     Raises
@@ -157,8 +151,9 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         if not np.isfinite(noise).any():
             raise refusal(folder, "expected readings, got none", f"sensors.{name}")
         content = f"{name} of {scenario.name}, less its noise-free reading, from {scenario.frame.settle:g} s on"
-        key = f"sensors/{name}"
-        records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content, signal=key))
+        records.append(
+            RateRecord(f"{scenario.name}_{name}", noise, instrument.sample_rate, content, signal=f"sensors/{name}")
+        )
     return records
 
 

@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from testbed.pages.palette import color_of
 from testbed.pages.svg import STYLE
 from testbed.units import DEG
 
@@ -38,7 +39,7 @@ def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
         figure = Figure(figsize=_SIZE_IN, layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
         for one in estimates:
-            color, shown = one.record.color, _shown(one.freq_hz.size)
+            color, shown = color_of(one.record.signal or f"columns/{one.record.name}"), _shown(one.freq_hz.size)
             freq, density = one.freq_hz[shown], np.sqrt(one.density[shown]) / DEG
             low, high = np.sqrt(one.limits)
             top.fill_between(freq, density * low, density * high, color=color, alpha=0.25, linewidth=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.judging.allan_records import Record
+from testbed.judging.allan_records import RateRecord
 from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
+def run_records(folder: Path, wanted: Sequence[str]) -> list[RateRecord]:
     """Return signals of a run from the end of settling on.
 
     Parameters
@@ -28,7 +28,7 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
 
     Returns
     -------
-    list of Record
+    list of RateRecord
         In that order.
 
     Raises
@@ -38,7 +38,6 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
     """
     run = RunRecord.open(folder)
     signals = {**run.sensors, **run.fusion, "truth": run.truth, "commanded": run.commanded}
-    keys = {name: f"{kind}/{name}" for kind in ("sensors", "fusion") for name in getattr(run, kind)}
     settle = float(run.metrics["settle_s"])
     records = []
     for name in wanted or [*run.sensors, *run.fusion]:
@@ -50,5 +49,6 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
         rate_hz = (time.size - 1) / float(time[-1] - time[0])
         first = math.ceil(round((settle - float(time[0])) * rate_hz, 6))
         rate = np.asarray(signals[name].rate)[max(first, 0) :]
-        records.append(Record(name, rate, rate_hz, f"{name} of {folder}", signal=keys.get(name, name)))
+        group = "sensors/" if name in run.sensors else "fusion/" if name in run.fusion else ""
+        records.append(RateRecord(name, rate, rate_hz, f"{name} of {folder}", signal=f"{group}{name}"))
     return records
