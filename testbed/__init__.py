@@ -75,6 +75,7 @@ from typing import TYPE_CHECKING, Any
 from testbed._version import __version__
 
 if TYPE_CHECKING:
+    from testbed.campaigns.evaluate import evaluate
     from testbed.chain.runner import run
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
@@ -96,6 +97,7 @@ __all__ = [
     "__version__",
     "belief_of",
     "estimate",
+    "evaluate",
     "list_filters",
     "list_motions",
     "list_presets",
@@ -117,6 +119,7 @@ _LAZY = {
     "UnknownNameError": "testbed.errors",
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
+    "evaluate": "testbed.campaigns.evaluate",
     "list_filters": "testbed.fusion",
     "list_motions": "testbed.models.motions",
     "list_presets": "testbed.sensors",
