@@ -17,8 +17,9 @@ from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, Ther
 from testbed.sensors.checked import CheckedSensor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
+    from testbed.fusion import EstimateBlock
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.turntable import TruthBlock
     from testbed.scenario.model import FilterSpec, Scenario
@@ -51,12 +52,27 @@ class Instruments:
 
     def process(self, command: CommandBlock, truth: TruthBlock) -> RunBlock:
         """Return all that the run has over a block of the truth."""
+        return self._block(command, truth, CheckedFilter.process)
+
+    def tried(self, command: CommandBlock, truth: TruthBlock) -> RunBlock:
+        """Return the same of a trial, in which shipped filters stay undefined (`CheckedFilter.tried`)."""
+        return self._block(command, truth, CheckedFilter.tried)
+
+    @property
+    def untried_seconds(self) -> float:
+        """About how long the filters take, per base sample, for what `tried` leaves out [s]."""
+        steps = {name: self.rates[name] / self.rates["base"] for name in self._fusion}
+        return sum(steps[name] * stage.untried_seconds for name, stage in self._fusion.items())
+
+    def _block(
+        self, command: CommandBlock, truth: TruthBlock, estimated: Callable[[CheckedFilter, Any], EstimateBlock]
+    ) -> RunBlock:
         readings, profiles = {}, {}
         for name in self._sensors:
             readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: stage.process(readings) for name, stage in self._fusion.items()}
+        estimates = {name: estimated(stage, readings) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         return RunBlock(
             command.start,

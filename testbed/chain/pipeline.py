@@ -33,6 +33,15 @@ class Chain:
         """Advance everything by `n_time` base samples."""
         return self._instruments.process(*self._truth.process(n_time))
 
+    def tried(self, n_time: int) -> RunBlock:
+        """Advance a trial by `n_time` base samples, in which shipped filters stay undefined (`CheckedFilter.tried`)."""
+        return self._instruments.tried(*self._truth.process(n_time))
+
+    @property
+    def untried_seconds(self) -> float:
+        """About how long the filters take, per base sample, for what `tried` leaves out [s]."""
+        return self._instruments.untried_seconds
+
 
 def simulate(scenario: Scenario, block: float | None = None) -> tuple[Chain, Iterator[RunBlock]]:
     """Return the chain of a scenario and the iterator that runs it.
