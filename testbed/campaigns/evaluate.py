@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.pipeline import block_lengths
-from testbed.chain.runner import versions
+from testbed.chain.versions import versions
 from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
