@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import ArrayTable, guard
 from testbed.logs.table import TableColumn
@@ -75,7 +76,7 @@ def _add(table: ArrayTable, name: str, value: Any, group: str) -> None:
         for field in array.dtype.names:
             _add(table, f"{name}/{field}", array.item()[array.dtype.names.index(field)], name)
     elif array.dtype.kind == "O" or type(value).__name__ == "MatlabOpaque":
-        table.notes.append(f"{name!r} was left out: an object of MATLAB; save its columns as arrays")
+        table.notes.append(f"{quoted(name)} was left out: an object of MATLAB; save its columns as arrays")
     elif array.size == 1 and array.dtype.kind in "iufU":
         table.header[name.rpartition("/")[2]] = str(array.item())
     else:
