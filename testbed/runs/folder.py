@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from typing import Self
 
 
-ESSENTIAL = ("scenario.yaml", "run.nc", "metrics.json")
+SIGNALS = "run.nc"
+ESSENTIAL = ("scenario.yaml", SIGNALS, "metrics.json")
 
 
 class RunFolder:
