@@ -139,9 +139,8 @@ def test_the_foundation_knows_no_room(name):
         assert set(imports_of(path)) <= FOUNDATION
 
 
-# Every paper's module has a `report`; one `Record` is of a rate alone, one has its temperature. The functions of the
-# command line are named as its commands.
-SHARED_NAMES = {"report", "Record"}
+# Every paper's module has a `report`. The functions of the command line are named as its commands.
+SHARED_NAMES = {"report"}
 
 
 @pytest.mark.contract

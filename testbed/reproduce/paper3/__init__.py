@@ -16,7 +16,7 @@ from testbed.compensation import paper3
 from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.quality import smoothed
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
 
-    Compensate = Callable[[Record], FloatArray]
+    Compensate = Callable[[GyroRecord], FloatArray]
 
 EARTH = SPEED * np.sin(np.pi / 4.0)  # rad/s, about the vertical at 45 degrees
 _HOLD = {"hold": "2 h"}
@@ -135,7 +135,7 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
     stage = fog.start(sample_rate_hz, seed, "fog")
     oven = Surroundings(temperature=profile.at(0, n_time, sample_rate_hz))
     rate = stage.process_in(np.full(n_time, EARTH), oven)
-    return ThermalRecord(f"{programme}, seed {seed}", Record(rate, stage.temperature, sample_rate_hz), stage.drift)
+    return ThermalRecord(f"{programme}, seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
 def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
