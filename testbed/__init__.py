@@ -75,6 +75,7 @@ from typing import TYPE_CHECKING, Any
 from testbed._version import __version__
 
 if TYPE_CHECKING:
+    from testbed.campaigns.evaluate import evaluate
     from testbed.chain.runner import run
     from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
@@ -97,6 +98,7 @@ __all__ = [
     "__version__",
     "belief_of",
     "estimate",
+    "evaluate",
     "line_of_sight",
     "list_filters",
     "list_motions",
@@ -119,6 +121,7 @@ _LAZY = {
     "UnknownNameError": "testbed.errors",
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
+    "evaluate": "testbed.campaigns.evaluate",
     "line_of_sight": "testbed.chain.sight",
     "list_filters": "testbed.fusion",
     "list_motions": "testbed.models.motions",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _GOOD, _OTHER, _FRONT = "#1a7f4b", "#8a8a8a", "#1f5fa8"
 
 
-def pareto_figure(design: Design, metric: str, limit: float) -> Figure:
+def pareto_figure(design: Design, metric: str, limit: float, words: str) -> Figure:
     """Draw cost against error of every candidate, the front of those worth their cost, and what is asked.
 
     Parameters
@@ -28,6 +28,8 @@ def pareto_figure(design: Design, metric: str, limit: float) -> Figure:
         Which error [urad].
     limit : float
         What is asked [urad].
+    words : str
+        Name of the error.
 
     Returns
     -------
@@ -53,9 +55,9 @@ def pareto_figure(design: Design, metric: str, limit: float) -> Figure:
         if (chosen := design.chosen) is not None:
             place = chosen.cost, chosen.values[metric]
             axes.plot(*place, "o", markersize=12, markerfacecolor="none", markeredgecolor=_FRONT, markeredgewidth=1.6)
-            axes.annotate(chosen.name, place, xytext=(0, -16), textcoords="offset points", ha="center", va="top")
+            axes.annotate(chosen.name, place, xytext=(-11, -3), textcoords="offset points", ha="right", va="top")
         axes.set_xlabel("cost")
-        axes.set_ylabel(f"{metric.partition('_urad')[0].upper().replace('_', ' ')} [µrad]")
+        axes.set_ylabel(f"{words} [µrad]")
         axes.margins(x=0.08, y=0.16)
         decade_axis(axes)
         axes.grid(visible=True)

@@ -29,6 +29,7 @@ def design(
     from testbed.design.search import search
     from testbed.judging.allan_analysis import write_figure
     from testbed.runs.folder import failing_as_run_error
+    from testbed.runs.table import metric_text
 
     asked = read_requirement(requirement, plugins=plugin or ())
     found = search(asked)
@@ -36,7 +37,11 @@ def design(
     folder = out or Path("runs") / asked.scenario.name
     with failing_as_run_error(str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
-        written = [write_figure(pareto_figure(found, first.metric, first.limit), folder / "pareto.svg")]
+        written = [
+            write_figure(
+                pareto_figure(found, first.metric, first.limit, metric_text(first.metric)), folder / "pareto.svg"
+            )
+        ]
         if chosen is not None:
             written.append(designs.write_chosen(asked, chosen, folder / "chosen.yaml"))
     proof = designs.prove(asked, chosen, seeds) if prove and chosen is not None else None
