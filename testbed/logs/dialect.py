@@ -137,6 +137,8 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     ScenarioError
         If it holds no column of numbers, or can be read in two ways.
     """
+    if options.drop_faulty and not head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        head = head.rstrip(b"\0")
     encoding = options.encoding or find_encoding(path, head)
     lines = _lines(path, head, encoding, complete=complete)
     rest = [(number, text) for number, text in lines if number > (options.skip or 0)]
@@ -145,7 +147,8 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
         content = [(number, text) for number, text in content if re.search(word_pattern(options.only), text)]
     if not content:
         only = "" if options.only is None else f" with the word {options.only!r}"
-        raise refusal(path, f"expected a column of numbers, got no line{only}")
+        where = only if complete else f"{only} in the first {HEAD >> 20} MB but comments"
+        raise refusal(path, f"expected a column of numbers, got no line{where}")
     ornaments = find_ornaments([text for _, text in _tail(content)])
     if ornaments.swaps:
         content = [(number, ornaments.off(text)) for number, text in content]
@@ -186,6 +189,8 @@ def find_encoding(path: Path, head: bytes) -> str:
     """
     for mark, name in (
         (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF32_LE, "utf-32"),
+        (codecs.BOM_UTF32_BE, "utf-32"),
         (codecs.BOM_UTF16_LE, "utf-16"),
         (codecs.BOM_UTF16_BE, "utf-16"),
     ):
@@ -196,9 +201,8 @@ def find_encoding(path: Path, head: bytes) -> str:
         if min(even, odd) == 0 and max(even, odd) > len(head[:4000]) // 6:
             return "utf-16-le" if odd else "utf-16-be"
         line = head.count(b"\n", 0, head.index(b"\0")) + 1
-        raise refusal(
-            path, "cannot be read: a NUL byte, so it is no text, or it was cut while written; remove it", line=line
-        )
+        message = "cannot be read: a NUL byte, so it is no text, or it was cut while written"
+        raise refusal(path, f"{message}; remove it, or --drop-faulty", line=line)
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
@@ -212,7 +216,7 @@ def fields_of(text: str, separator: str) -> list[str]:
         # A unit in brackets belongs to the name before it.
         closed = ("[" in text and "]" in text) or ("(" in text and ")" in text)
         joined = text.strip().replace(" [", "\0[").replace(" (", "\0(") if closed else text
-        return [field.replace("\0", " ") for field in joined.split()]
+        return [field.replace("\0", " ").strip('"') for field in joined.split()]
     if '"' not in text:
         return [field.strip() for field in text.split(separator)]
     return [field.strip() for field in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [""])]
@@ -330,6 +334,7 @@ def _parts(
     above = [(number, row) for number, row in rows[:start]]
     n_named = n_columns - all(len(row) != n_columns or row[-1] == "" for _, row in rows[start : start + _SAMPLE])
     header, unit_line = _header(above, n_named, n_columns)
+    header = header or _one_less(above, n_named, decimal)
     names, header_line = (header[1], header[0]) if header else _commented(lines, first, separator, n_named)
     return Dialect(
         encoding=encoding,
@@ -410,6 +415,14 @@ def _header(
         above_them = near[place + 1][1]
         names = [" ".join(filter(None, pair)) for pair in zip(above_them, names, strict=False)]
     return (number, names), None if at is None else near[at]
+
+
+def _one_less(above: list[tuple[int, list[str]]], n_columns: int, decimal: str) -> tuple[int, list[str]] | None:
+    """Return the names above the rows that leave out the first column, the number of the row, as R writes them."""
+    if not above or len(above[-1][1]) != n_columns - 1 or n_columns < 3:
+        return None
+    number, names = above[-1]
+    return (number, ["", *names]) if all(name and not _is_value(name, decimal) for name in names) else None
 
 
 def _is_unit(cell: str) -> bool:
