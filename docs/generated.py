@@ -98,6 +98,7 @@ def _groups(whole: Mapping[str, Any]) -> Iterator[tuple[str, list[tuple[str, Map
     yield "Motions", [next(iter(one["properties"].items())) for one in top["motion"]["items"]["oneOf"]]
     yield "Sensors", [(one["title"], one) for one in top["sensors"]["additionalProperties"]["anyOf"]]
     yield "Filters", list(top["fusion"]["properties"].items())
+    yield "Pointing", [("pointing", top["pointing"])]
     yield "Parts of these", sorted(whole["$defs"].items())
 
 

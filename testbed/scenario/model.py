@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.models.turntable.floor import FloorMotion
     from testbed.models.turntable.parameters import TurntableParameters
+    from testbed.pointing.parameters import PointingParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
@@ -176,11 +177,17 @@ class Scenario:
     presets: Mapping[str, Any] = field(repr=False)
     plugins: tuple[Plugin, ...] = ()
     allow_outside: bool = False
+    pointing: PointingParameters | None = None
 
     @property
     def truth_seed(self) -> int:
         """Seed of the random streams of the truth."""
         return self.frame.seed if self.frame.truth_seed is None else self.frame.truth_seed
+
+    @property
+    def random_truth(self) -> bool:
+        """Whether another `truth_seed` is another truth."""
+        return bool(self.turntable.floor.bands) or any(motion.draws for _, motion in self.motion)
 
     def floor(self, duration: float | None = None) -> FloorMotion:
         """Return how the floor of the run moves.
@@ -324,6 +331,7 @@ class Scenario:
                 name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
+            **({} if self.pointing is None else {"pointing": dump(self.pointing)}),
             "expect": _expectations(self.expect),
         }
 

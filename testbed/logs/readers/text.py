@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from testbed.errors import quoted
-from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, find_dialect, word_pattern
+from testbed.logs.cells import CLOCK, COMMENTS, ISO
+from testbed.logs.dialect import HEAD, Dialect, find_dialect, word_pattern
 from testbed.logs.options import refusal
 from testbed.logs.selection import TextOptions
 from testbed.logs.table import TableColumn
