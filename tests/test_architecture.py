@@ -37,7 +37,7 @@ ROOMS = {
     "notebook": {"pages", "runs", "report"},
     "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
     "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording", "notebook"},
-    "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs"},
+    "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs", "pages"},
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.
