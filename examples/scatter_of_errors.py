@@ -1,4 +1,4 @@
-"""How the error of each filter scatters over seeds, and what a better gyro would bring.
+"""How the error of each filter scatters over seeds, and what a noisier gyro would cost.
 
 Run: `python examples/scatter_of_errors.py [SCENARIO.yaml] [--seeds 20] [--seconds 20]`
 """
@@ -13,7 +13,10 @@ import numpy as np
 import testbed
 
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "mixed_0p5hz_10hz.yaml"
-CHANGES = {"as it is": {}, "half the angle random walk": {"sensors.mems_gyro.angle_random_walk": "0.075 deg/sqrt(h)"}}
+CHANGES = {
+    "as it is": {},
+    "ten times the angle random walk": {"sensors.mems_gyro.angle_random_walk": "1.5 deg/sqrt(h)"},
+}
 
 
 def quantiles(scenario: testbed.Scenario, seeds: int) -> dict[str, dict[str, list[float]]]:
@@ -38,10 +41,10 @@ def main() -> None:
     scenario = testbed.load_scenario(given.scenario).with_(
         duration=f"{given.seconds} s", settle=f"{given.seconds / 2} s", **{"turntable.engine": "auto"}
     )
-    print(f"{'':30}{'filter':16}{'5 %':>10}{'median':>10}{'95 %':>10}  RMSE [deg/s], {given.seeds} seeds")
+    print(f"{'':34}{'filter':16}{'5 %':>10}{'median':>10}{'95 %':>10}  RMSE [deg/s], {given.seeds} seeds")
     for label, filters in quantiles(scenario, given.seeds).items():
         for name, values in filters.items():
-            print(f"{label:30}{name:16}" + "".join(f"{value:10.5f}" for value in values))
+            print(f"{label:34}{name:16}" + "".join(f"{value:10.5f}" for value in values))
 
 
 if __name__ == "__main__":

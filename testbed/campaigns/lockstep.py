@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.many import ManyFilters, ManySensors
 from testbed.chain.instruments import sample_rates
+from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import Truth
 from testbed.judging.case import Case
 from testbed.judging.judge import Judge
@@ -45,6 +46,9 @@ class Lockstep:
         self._estimates = [self._find_filters(case, reads) for case, reads in zip(cases, self._reads, strict=True)]
         rates = [sample_rates(case) for case in cases]
         self._common = [Case(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
+        self._sights = {
+            (i, seed): LinesOfSight(case.with_seed(seed), rates[i]) for i, case in enumerate(cases) for seed in seeds
+        }
         self._judges = {
             (i, seed): Judge(case.with_seed(seed), rates[i], self._truth.step, self._common[i])
             for i, case in enumerate(cases)
@@ -87,7 +91,10 @@ class Lockstep:
                 for j, seed in enumerate(pack):
                     sensed = {name: readings[at][j] for name, at in reads.items()}
                     found = {name: estimates[at][j] for name, at in made.items()}
-                    self._judges[i, seed].write(RunBlock(command.start, command, truth, sensed, found, {}))
+                    rates = {name: estimate.rate for name, estimate in found.items()}
+                    sight = self._sights[i, seed].process(truth.rate, truth.sensor_rate, sensed, rates)
+                    block = RunBlock(command.start, command, truth, sensed, found, {}, pointing=sight)
+                    self._judges[i, seed].write(block)
 
     def metrics(self, case: int, seed: int, versions: Mapping[str, str]) -> RunMetrics:
         """Return the metrics of a case under a seed.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import POSE_STRIDE
 from testbed.errors import RunError
 from testbed.fusion import FILTERS
@@ -48,6 +49,7 @@ class Instruments:
             for name, sensor in scenario.sensors.items()
             if scenario.sensor_types[name] not in SENSORS
         }
+        self._pointing = LinesOfSight(scenario, self.rates)
         self._fusion = {name: start_filter(scenario, name, spec) for name, spec in scenario.fusion.items()}
 
     def process(self, command: CommandBlock, truth: TruthBlock) -> RunBlock:
@@ -74,6 +76,7 @@ class Instruments:
                 profiles[name] = profile
         estimates = {name: estimated(stage, readings) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
+        rates = {name: estimate.rate for name, estimate in estimates.items()}
         return RunBlock(
             command.start,
             command,
@@ -83,6 +86,7 @@ class Instruments:
             profiles,
             temperatures={name: stage.temperature for name, stage in thermal.items()},
             drifts={name: stage.drift for name, stage in thermal.items()},
+            pointing=self._pointing.process(truth.rate, truth.sensor_rate, readings, rates),
         )
 
     def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from testbed.fusion.belief import declared
 from testbed.judging.case import Case
+from testbed.judging.sights import pointing_judges, pointing_value
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
 from testbed.runs.metrics import RunMetrics
@@ -50,6 +51,7 @@ class Judge:
         }
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
+        self._sights = pointing_judges(scenario, rates["base"])
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
@@ -61,6 +63,8 @@ class Judge:
             error, settled = self._add(name, estimate.rate, estimate.std)
             self._gated.setdefault(name, {}).update(_gated(estimate.diagnostics))
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
+        for name, sight in block.pointing.items():
+            self._sights[name].process(sight, block.truth.rate)
 
     def _add(self, name: str, rate: FloatArray, std: FloatArray | None) -> tuple[FloatArray, int]:
         """Add a block of readings or estimates; return the error after `settle`, and at which sample of the block that
@@ -100,6 +104,7 @@ class Judge:
             of_lines = self._case.of_run(lines, name)[1]
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
+        sights = {name: sight.result() for name, sight in self._sights.items()}
         found = {
             "scenario": self._scenario.name,
             "seed": frame.seed,
@@ -111,7 +116,8 @@ class Judge:
             "fusion": fusion,
             "bounds_reason": self._case.reason(why),
             **self._case.pages,
-            "expectations": self._expectations({**sensors, **fusion}),
+            **({"pointing": sights} if sights else {}),
+            "expectations": self._expectations({**sensors, **fusion}, sights),
             "versions": dict(versions or {}),
         }
         return RunMetrics.model_validate(found)
@@ -123,10 +129,14 @@ class Judge:
         found = [line for name in [*self._scenario.fusion][:1] for line in self._errors[name].truth_lines()]
         return tuple((freq, amplitude) for freq, amplitude in found if amplitude > np.deg2rad(1e-9))
 
-    def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    def _expectations(
+        self, results: Mapping[str, dict[str, Any]], sights: Mapping[str, dict[str, Any]]
+    ) -> list[dict[str, Any]]:
         rows = []
         for bound in self._scenario.expect:
             value = results[bound.subject].get(bound.metric)
+            if value is None and bound.subject in sights:
+                value = pointing_value(sights[bound.subject], bound.metric)
             rows.append(
                 {
                     "subject": bound.subject,

@@ -64,7 +64,7 @@ GYRO = {
     "jitter": "200 us",
     "fir": "average",
     "scale_factor_asymmetry": "0.01",
-    "word_bits": 12,
+    "sensitivity": "100 LSB/(deg/s)",
     "cross_axis": ["0.01", "0.02"],
     "range": "0.96 deg/s",
     "rate_ramp": "0.1 deg/s^2",

@@ -145,18 +145,8 @@ def test_a_case_that_fails_is_a_row_with_its_reason_and_stops_nothing(tmp_path, 
 
 def squares_of(plan_rows):
     def fake(task):
-        return [
-            {
-                "case": task.case.number,
-                "seed": seed,
-                "kind": "filter",
-                "source": "kalman",
-                "status": "ok",
-                "rmse_deg_s": e,
-            }
-            for seed in task.seeds
-            for e in [plan_rows(task.case.number, seed)]
-        ]
+        common = {"case": task.case.number, "kind": "filter", "source": "kalman", "status": "ok"}
+        return [{**common, "seed": seed, "rmse_deg_s": plan_rows(task.case.number, seed)} for seed in task.seeds]
 
     return fake
 
