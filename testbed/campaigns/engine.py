@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any
 
-from testbed.campaigns.plan import Plan, Task, play
+from testbed.campaigns.agenda import Agenda, Task, play
 from testbed.errors import RunError
 
 if TYPE_CHECKING:
@@ -18,28 +18,28 @@ _AHEAD = 3
 LOOPBACK = "127.0.0.1"
 
 
-def play_here(plan: Plan, take: Take) -> None:
+def play_here(agenda: Agenda, take: Take) -> None:
     """Play all tasks in this process.
 
     Parameters
     ----------
-    plan : Plan
+    agenda : Agenda
         Hands out the tasks.
     take : callable
         Gets every task with its rows.
     """
-    while (task := plan.next()) is not None:
+    while (task := agenda.next()) is not None:
         rows = play(task)
-        plan.finish(task, rows)
+        agenda.finish(task, rows)
         take(task, rows)
 
 
-def play_on_cluster(plan: Plan, take: Take, *, workers: int = 0, scheduler: str | None = None) -> None:
+def play_on_cluster(agenda: Agenda, take: Take, *, workers: int = 0, scheduler: str | None = None) -> None:
     """Play the tasks on workers of Dask.
 
     Parameters
     ----------
-    plan : Plan
+    agenda : Agenda
         Hands out the tasks.
     take : callable
         Gets every task with its rows, in whatever order they finish.
@@ -61,22 +61,22 @@ def play_on_cluster(plan: Plan, take: Take, *, workers: int = 0, scheduler: str 
         running: dict[Any, Task] = {}
         results = as_completed()
         try:
-            _submit(client, plan, running, results, ahead)
+            _submit(client, agenda, running, results, ahead)
             while running:
                 future = next(results)
                 task = running.pop(future)
                 rows = future.result()
                 future.release()
-                plan.finish(task, rows)
+                agenda.finish(task, rows)
                 take(task, rows)
-                _submit(client, plan, running, results, ahead)
+                _submit(client, agenda, running, results, ahead)
         except (OSError, TimeoutError, FutureCancelledError, StopIteration) as error:
             msg = f"the scheduler was lost ({type(error).__name__}: {error}): run the same command again to go on"
             raise RunError(msg) from error
 
 
-def _submit(client: Any, plan: Plan, running: dict[Any, Task], results: Any, ahead: int) -> None:
-    while len(running) < ahead and (task := plan.next()) is not None:
+def _submit(client: Any, agenda: Agenda, running: dict[Any, Task], results: Any, ahead: int) -> None:
+    while len(running) < ahead and (task := agenda.next()) is not None:
         future = client.submit(play, task, pure=False)
         running[future] = task
         results.add(future)

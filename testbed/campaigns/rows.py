@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from testbed.campaigns.study import Case, Study
+    from testbed.campaigns.study import Study, Variation
     from testbed.runs.metrics import RunMetrics, SourceMetrics
     from testbed.scenario.model import Scenario
 
@@ -97,12 +97,12 @@ def in_si(scenario: Scenario, key: str, written: Any) -> float | str | None:
     return None if written is None else str(written)
 
 
-def rows_of(case: Case, seed: int, metrics: RunMetrics) -> list[dict[str, Any]]:
+def rows_of(case: Variation, seed: int, metrics: RunMetrics) -> list[dict[str, Any]]:
     """Return the rows of one case under one seed.
 
     Parameters
     ----------
-    case : Case
+    case : Variation
         Which.
     seed : int
         Of its noise.
@@ -115,12 +115,12 @@ def rows_of(case: Case, seed: int, metrics: RunMetrics) -> list[dict[str, Any]]:
     return found
 
 
-def failed_row(case: Case, seed: int, reason: str) -> dict[str, Any]:
+def failed_row(case: Variation, seed: int, reason: str) -> dict[str, Any]:
     """Return the row of a case that has failed.
 
     Parameters
     ----------
-    case : Case
+    case : Variation
         Which.
     seed : int
         Of its noise.
@@ -130,7 +130,7 @@ def failed_row(case: Case, seed: int, reason: str) -> dict[str, Any]:
     return {**_common(case, seed), "status": FAILED, "reason": reason[:_MOST_REASON]}
 
 
-def _common(case: Case, seed: int) -> dict[str, Any]:
+def _common(case: Variation, seed: int) -> dict[str, Any]:
     axes = {key: in_si(case.scenario, key, written) for key, written in case.values.items()}
     return {
         "case": case.number,

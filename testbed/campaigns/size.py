@@ -8,8 +8,8 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from testbed.campaigns.agenda import CHUNK
 from testbed.campaigns.lockstep import Lockstep
-from testbed.campaigns.plan import CHUNK
 
 if TYPE_CHECKING:
     from testbed.campaigns.study import Study

@@ -101,7 +101,7 @@ class StudyFrame(Part):
 
 
 @dataclass(frozen=True)
-class Case:
+class Variation:
     """One variation: its number, what stands at the varied keys as written, and the scenario that it makes."""
 
     number: int
@@ -123,7 +123,7 @@ class Study:
     description: str
     file: str
     axes: tuple[str, ...]
-    cases: tuple[Case, ...]
+    cases: tuple[Variation, ...]
     seeds: tuple[int, ...]
     precision: float | None = None
 
@@ -213,11 +213,11 @@ def _variations(frame: StudyFrame, document: Document) -> list[dict[str, Any]]:
     ]
 
 
-def _cases(base: Scenario, variations: list[dict[str, Any]], document: Document) -> list[Case]:
+def _cases(base: Scenario, variations: list[dict[str, Any]], document: Document) -> list[Variation]:
     cases = []
     for number, values in enumerate(variations):
         try:
-            cases.append(Case(number, values, base.with_(**values) if values else base))
+            cases.append(Variation(number, values, base.with_(**values) if values else base))
         except ScenarioError as error:
             for problem in error.problems:
                 _find(document, number, values, problem)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from testbed.campaigns.agenda import Agenda, Task
 from testbed.campaigns.engine import play_here, play_on_cluster
 from testbed.campaigns.page import Page
-from testbed.campaigns.plan import Plan, Task
 from testbed.campaigns.rows import FAILED, schema_of
 from testbed.campaigns.store import CaseStore, read_cases
 from testbed.campaigns.study import Study, load_study
@@ -92,14 +92,24 @@ def sweep(
         If the study is bad, or the folder holds another one.
     RunError
         If the scheduler is lost; what is finished is kept.
+
+    Examples
+    --------
+    >>> base = "{name: base, duration: 0.1 s, motion: [{static: {}}], sensors: {mems_gyro: {preset: adis16505}}}"
+    >>> walks = "vary: {sensors.mems_gyro.angle_random_walk: [0.1 deg/sqrt(h), 1 deg/sqrt(h)]}"
+    >>> _ = Path("base.yaml").write_text(base)
+    >>> _ = Path("study.yaml").write_text(f"{{name: noises, base: base.yaml, {walks}, seeds: 3}}")
+    >>> folder = sweep("study.yaml")
+    >>> sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    ['cases.parquet', 'study.json', 'sweep.html']
     """
     loaded = study if isinstance(study, Study) else load_study(study)
     if workers < 1:
         raise ScenarioError([Problem(f"expected at least 1, got {workers}", "workers")])
     folder = Path("runs") / loaded.name if out is None else Path(out)
     with CaseStore(folder, loaded.document(), schema_of(loaded)) as store:
-        plan = Plan(loaded, store.done, _squares(folder) if loaded.precision is not None else None)
-        told, page = Progress(plan.runs, len(store.done)), Page(folder, loaded)
+        agenda = Agenda(loaded, store.done, _squares(folder) if loaded.precision is not None else None)
+        told, page = Progress(agenda.runs, len(store.done)), Page(folder, loaded)
 
         def take(_task: Task, rows: list[dict[str, Any]]) -> None:
             store.add(rows)
@@ -109,9 +119,9 @@ def sweep(
                 progress(told)
 
         if workers == 1 and scheduler is None:
-            play_here(plan, take)
+            play_here(agenda, take)
         else:
-            play_on_cluster(plan, take, workers=0 if scheduler else workers, scheduler=scheduler)
+            play_on_cluster(agenda, take, workers=0 if scheduler else workers, scheduler=scheduler)
         store.compact()
         page.write()
     return folder
@@ -129,6 +139,12 @@ def open_sweep(folder: str | Path) -> pa.Table:
     ------
     ScenarioError
         If it is no such folder.
+
+    Examples
+    --------
+    >>> open_sweep("nowhere")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: nowhere: expected the folder of a sweep, with cases.parquet
     """
     return read_cases(Path(folder))
 

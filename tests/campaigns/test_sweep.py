@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import testbed
+from testbed.campaigns.agenda import CHUNK, Agenda, play
 from testbed.campaigns.engine import play_here
-from testbed.campaigns.plan import CHUNK, Plan, play
 from testbed.campaigns.rows import FAILED, rows_of, schema_of
 from testbed.campaigns.store import CASES, CaseStore, read_cases
 from testbed.campaigns.study import load_study
@@ -160,7 +160,7 @@ def test_a_case_gets_chunks_until_its_error_is_known_and_the_order_of_others_cha
         return 1.0 + (0.2 if case else 0.01) * np.random.default_rng([case, seed]).standard_normal()
 
     def seeds_of(reverse, done=(), squares=None):
-        plan, fake, waiting, given = Plan(study, done, squares), squares_of(error), [], {0: set(), 1: set()}
+        plan, fake, waiting, given = Agenda(study, done, squares), squares_of(error), [], {0: set(), 1: set()}
         while True:
             while (task := plan.next()) is not None:
                 waiting.append(task)
@@ -189,7 +189,7 @@ def test_the_bias_of_stopping_early_is_small(tmp_path):
     for trial in range(300):
         rng = np.random.default_rng([9, trial])
         errors = dict(zip(study.seeds, np.sqrt(rng.chisquare(4.0, len(study.seeds)) / 4.0), strict=True))
-        plan, fake = Plan(study, ()), squares_of(lambda _, seed, errors=errors: errors[seed])
+        plan, fake = Agenda(study, ()), squares_of(lambda _, seed, errors=errors: errors[seed])
         used = []
         while (task := plan.next()) is not None:
             rows = fake(task)
@@ -237,10 +237,10 @@ def test_a_parent_that_is_killed_loses_nothing_that_was_finished(tmp_path):
 
 def test_what_a_task_gives_can_be_sent(tmp_path):
     study = load_study(written(tmp_path, "seeds: 1\n"))
-    task = Plan(study, ()).next()
+    task = Agenda(study, ()).next()
     assert task is not None
     rows = play(task)
     assert {row["kind"] for row in json.loads(json.dumps(rows))} == {"sensor", "filter"}
     taken = []
-    play_here(Plan(study, ()), lambda _, found: taken.extend(found))
+    play_here(Agenda(study, ()), lambda _, found: taken.extend(found))
     assert taken == rows

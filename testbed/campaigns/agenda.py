@@ -14,7 +14,7 @@ from testbed.campaigns.statistics import relative_half_width
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from testbed.campaigns.study import Case, Study
+    from testbed.campaigns.study import Study, Variation
 
 # Seeds of a task. They share a truth, and what is finished of them is kept when the process dies.
 CHUNK = 10
@@ -24,7 +24,7 @@ CHUNK = 10
 class Task:
     """A case and the seeds of one chunk of it that are still to be done."""
 
-    case: Case
+    case: Variation
     chunk: int
     seeds: tuple[int, ...]
 
@@ -48,7 +48,7 @@ def play(task: Task) -> list[dict[str, Any]]:
     return [row for seed, one in zip(task.seeds, found, strict=True) for row in rows_of(task.case, seed, one)]
 
 
-class Plan:
+class Agenda:
     """Hands out tasks until every case is done; a case with a precision gets chunk after chunk until it has it.
 
     What is handed out next depends on the rows of the case alone, never on the order in which others finish.
@@ -112,7 +112,7 @@ class Plan:
         if self._study.precision is not None:
             self._continue(task.case, task.chunk + 1)
 
-    def _continue(self, case: Case, chunk: int) -> None:
+    def _continue(self, case: Variation, chunk: int) -> None:
         """Queue what is next of a case from a chunk on: all of it, or one chunk where a precision decides."""
         seeds = self._study.seeds
         for k in range(chunk, -(-len(seeds) // CHUNK)):
