@@ -67,7 +67,7 @@ def size_of(study: Study, workers: int = 1) -> Size:
     )
 
 
-def size_words(size: Size) -> str:
+def sweep_words(size: Size) -> str:
     """Return what a sweep takes, in words.
 
     Parameters

@@ -94,11 +94,13 @@ def rank(errors: Mapping[str, FloatArray]) -> list[Comparison]:
     from scipy.stats import t as student
 
     names = list(errors)
+    if not names:
+        return []
     logs = np.log(np.stack([errors[name] for name in names]))
     # Of each seed, the mean over the cases: cases of one seed are not independent.
     whole = np.isfinite(logs).all(axis=(0, 1))
     means = logs[:, :, whole].mean(axis=1)
-    if not names or not means.shape[1]:
+    if not means.shape[1]:
         return []
     order = np.argsort(means.mean(axis=1), kind="stable")
     best, n = means[order[0]], means.shape[1]

@@ -37,11 +37,11 @@ def sweep(
     if only is not None:
         _repeat(loaded, only, out, output)
         return
-    from testbed.campaigns.size import size_of, size_words
+    from testbed.campaigns.size import size_of, sweep_words
     from testbed.campaigns.sweep import sweep as play
     from testbed.cli.progress import sweeping
 
-    output.note(f"{loaded.name}: {size_words(size_of(loaded, workers))}")
+    output.note(f"{loaded.name}: {sweep_words(size_of(loaded, workers))}")
     if output.quiet:
         folder, told = play(loaded, workers=workers, scheduler=scheduler, out=out), None
     else:
