@@ -1,4 +1,4 @@
-"""How the error of each filter scatters over seeds, and what a noisier gyro would cost.
+"""How the error of each filter scatters over seeds, and what a noisier MHD ARS would cost.
 
 Run: `python examples/scatter_of_errors.py [SCENARIO.yaml] [--seeds 20] [--seconds 20]`
 """
@@ -15,7 +15,7 @@ import testbed
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "mixed_0p5hz_10hz.yaml"
 CHANGES = {
     "as it is": {},
-    "ten times the angle random walk": {"sensors.mems_gyro.angle_random_walk": "1.5 deg/sqrt(h)"},
+    "a noisy MHD ARS": {"sensors.mhd_ars.noise_density": "10 urad/s/sqrt(Hz)"},
 }
 
 

@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from testbed.campaigns.evaluate import evaluate
     from testbed.campaigns.sweep import open_sweep, sweep
     from testbed.chain.runner import run
+    from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
     from testbed.logs import read_log
@@ -99,6 +100,7 @@ __all__ = [
     "belief_of",
     "estimate",
     "evaluate",
+    "line_of_sight",
     "list_filters",
     "list_motions",
     "list_presets",
@@ -123,6 +125,7 @@ _LAZY = {
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
+    "line_of_sight": "testbed.chain.sight",
     "open_sweep": "testbed.campaigns.sweep",
     "sweep": "testbed.campaigns.sweep",
     "list_filters": "testbed.fusion",

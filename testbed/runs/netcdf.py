@@ -1,6 +1,7 @@
 """run.nc: every signal of a run as NetCDF-4, written block by block.
 
-Compression is where it earns its time: of diagnostics, which often stay the same or are undefined, and of the times.
+Compression is where it earns its time: of diagnostics, which often stay the same or are undefined, of the times, and of
+what stands still in the first block.
 The digits of a rate are noise: of them it would take a quarter, for as much time as all else.
 """
 
@@ -93,7 +94,7 @@ class NetcdfStore:
         """Append a block."""
         for group, name, start, rate, values in columns(block, self._rates):
             if (group, name) not in self._datasets:
-                self._create(group, name, rate)
+                self._create(group, name, rate, still=values.size > 0 and float(np.ptp(values)) == 0.0)
             if values.size:
                 self._datasets[group, name][start : start + values.size] = values
         self._raw.check()
@@ -106,17 +107,17 @@ class NetcdfStore:
             self._raw.close()
             self._raw.check()
 
-    def _create(self, group: str, name: str, rate: float) -> None:
+    def _create(self, group: str, name: str, rate: float, *, still: bool) -> None:
         n = -(-self._n_base // round(self._rates["base"] / rate))
         node = self._group(group)
         if "time" not in node.variables:
             node.dimensions["time"] = n
-            time = self._variable(node, group, "time", n)
+            time = self._variable(node, group, "time", n, packed=True)
             for start in range(0, n, _CHUNK):
                 stop = min(start + _CHUNK, n)
                 time[start:stop] = np.arange(start, stop) / rate
             node.attrs["sample_rate_hz"] = rate
-        self._datasets[group, name] = self._variable(node, group, name, n)
+        self._datasets[group, name] = self._variable(node, group, name, n, packed=still or not is_precise(name))
 
     def _group(self, path: str) -> Any:
         node = self._file
@@ -124,8 +125,7 @@ class NetcdfStore:
             node = node.groups[name] if name in node.groups else node.create_group(name)
         return node
 
-    def _variable(self, node: Any, group: str, name: str, n: int) -> h5py.Dataset:
-        packed = name == "time" or not is_precise(name)
+    def _variable(self, node: Any, group: str, name: str, n: int, *, packed: bool) -> h5py.Dataset:
         variable = node.create_variable(
             name,
             ("time",),

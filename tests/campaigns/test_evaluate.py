@@ -48,6 +48,9 @@ def shortened(path):
     scenario = testbed.load_scenario(path)
     length = max(0.1, 200.0 / scenario.base_rate_hz)
     gone = dict.fromkeys({"expect", "detail"} & set(scenario.source))
+    if scenario.pointing is not None:
+        gone |= {"pointing.windows": ["1 ms", "10 ms"]}
+        gone |= {"pointing.tracker.fades": []} if scenario.pointing.tracker.fades else {}
     return scenario.with_(duration=f"{length} s", settle=f"{length / 2} s", **gone)
 
 

@@ -1,4 +1,4 @@
-"""The scatter of errors: quantiles in order, and a noisier gyro errs more."""
+"""The scatter of errors: quantiles in order, and a noisier sensor errs more."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from testbed.scenario.loader import load_scenario
 from tests.examples.programs import example
 
 
-def test_a_noisier_gyro_errs_more():
+def test_a_noisier_sensor_errs_more():
     program = example("scatter_of_errors")
     scenario = load_scenario(program.SCENARIO).with_(
         duration="1 s", settle="0.5 s", expect=None, **{"turntable.engine": "modal", "fusion": {"kalman": {}}}
@@ -14,4 +14,4 @@ def test_a_noisier_gyro_errs_more():
     found = program.quantiles(scenario, 4)
     low, median, high = found["as it is"]["kalman"]
     assert low < median < high
-    assert found["ten times the angle random walk"]["kalman"][1] > high
+    assert found["a noisy MHD ARS"]["kalman"][1] > high
