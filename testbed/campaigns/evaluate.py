@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.pipeline import block_lengths
@@ -20,25 +20,11 @@ if TYPE_CHECKING:
 _TOGETHER = 128
 
 
-@overload
-def evaluate(
-    scenario: Scenario | str | Path | Mapping[str, Any], seeds: Iterable[int], settings: None = None
-) -> list[RunMetrics]: ...
-
-
-@overload
-def evaluate(
-    scenario: Scenario | str | Path | Mapping[str, Any],
-    seeds: Iterable[int],
-    settings: Iterable[Mapping[str, Any]],
-) -> list[list[RunMetrics]]: ...
-
-
 def evaluate(
     scenario: Scenario | str | Path | Mapping[str, Any],
     seeds: Iterable[int],
     settings: Iterable[Mapping[str, Any]] | None = None,
-) -> list[RunMetrics] | list[list[RunMetrics]]:
+) -> list[Any]:
     """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9.
 
     Nothing is written and no signal is kept: memory grows neither with the duration nor with the number of seeds, but

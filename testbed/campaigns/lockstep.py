@@ -8,7 +8,7 @@ from testbed.campaigns.many import ManyFilters, ManySensors
 from testbed.chain.instruments import sample_rates
 from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import Truth
-from testbed.judging.case import Case
+from testbed.judging.case import CaseFacts
 from testbed.judging.judge import Judge
 from testbed.runs.block import RunBlock
 
@@ -45,7 +45,7 @@ class Lockstep:
         self._reads = [self._find_sensors(case) for case in cases]
         self._estimates = [self._find_filters(case, reads) for case, reads in zip(cases, self._reads, strict=True)]
         rates = [sample_rates(case) for case in cases]
-        self._common = [Case(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
+        self._common = [CaseFacts(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
         self._sights = {
             (i, seed): LinesOfSight(case.with_seed(seed), rates[i]) for i, case in enumerate(cases) for seed in seeds
         }

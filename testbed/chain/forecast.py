@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from testbed.scenario.step_choice import StepChoice
 
 # Compiled functions are loaded in the first, the second is measured.
-_WARM, _TRIED = 200, 4000
+_WARM, _TRIED = 200, 1000
 # Beside the chain, per byte that is written: compression, metrics and recording, on a core of 2020.
 _SECONDS_PER_BYTE = 4e-8
 # Once per run: recording, report.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Lines = tuple[tuple[float, float], ...]
 
 
-class Case:
+class CaseFacts:
     """What the metrics of a scenario have in common whatever the seed of its noise; worked out once.
 
     Parameters

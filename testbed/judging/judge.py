@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.belief import declared
-from testbed.judging.case import Case
+from testbed.judging.case import CaseFacts
 from testbed.judging.sights import pointing_judges, pointing_value
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
@@ -33,15 +33,15 @@ class Judge:
         Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
     step : StepChoice
         How the plant is integrated.
-    case : Case, optional
+    case : CaseFacts, optional
         What it shares with the judges of other seeds over the same truth; whoever hands it in also writes it, first.
     """
 
     def __init__(
-        self, scenario: Scenario, rates: Mapping[str, float], step: StepChoice, case: Case | None = None
+        self, scenario: Scenario, rates: Mapping[str, float], step: StepChoice, case: CaseFacts | None = None
     ) -> None:
         self._scenario, self._shares = scenario, case is not None
-        self._case = case or Case(scenario, rates, step)
+        self._case = case or CaseFacts(scenario, rates, step)
         # A sensor may lose readings; an estimate that is not a number is a failure and stays undefined.
         span = (scenario.frame.settle, scenario.frame.duration)
         waves = self._case.waves
