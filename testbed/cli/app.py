@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from testbed._version import __version__
-from testbed.cli.commands import allan, compensate, folder, log, parts, pointing, psd, reproduce, scenario
+from testbed.cli.commands import allan, compensate, folder, log, parts, pointing, psd, reproduce, scenario, sweep
 from testbed.cli.status import OK
 
 app = typer.Typer(
@@ -27,6 +27,7 @@ app.command()(allan.allan)
 app.command()(psd.psd)
 app.command()(pointing.pointing)
 app.command()(reproduce.reproduce)
+app.command()(sweep.sweep)
 app.add_typer(compensate.app)
 app.add_typer(log.app)
 
