@@ -94,7 +94,7 @@ def print_proof(proof: dict[str, dict[str, Any]]) -> None:
     terminal().print(table)
 
 
-def rows_of(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
+def candidate_rows(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
     """Return candidates as rows: cost, values, whether enough, parts.
 
     Parameters

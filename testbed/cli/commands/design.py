@@ -46,9 +46,9 @@ def design(
             written.append(designs.write_chosen(asked, chosen, folder / "chosen.yaml"))
     proof = designs.prove(asked, chosen, seeds) if prove and chosen is not None else None
     document = {
-        "candidates": designs.rows_of(found.candidates),
-        "pareto": designs.rows_of(found.pareto(first.metric)),
-        "chosen": None if chosen is None else designs.rows_of([chosen])[0],
+        "candidates": designs.candidate_rows(found.candidates),
+        "pareto": designs.candidate_rows(found.pareto(first.metric)),
+        "chosen": None if chosen is None else designs.candidate_rows([chosen])[0],
         "refused": dict(found.refused),
         "proof": proof,
         "written": [str(path) for path in written],
