@@ -166,8 +166,9 @@ def refuse_uneven(table: Table, clock: TimeBase) -> None:
     ScenarioError
         If a stamp goes back or stands twice, or a step is no multiple of the usual one.
     """
-    mean = f"'{clock.mean_rate_hz:.6g} Hz'" if np.isfinite(clock.mean_rate_hz) else "with the true rate"
-    rate = f"--rate {mean}"
+    rate = f"--rate '{clock.mean_rate_hz:.6g} Hz'" if np.isfinite(clock.mean_rate_hz) else "--rate (the true one)"
+    if clock.end_ns == clock.start_ns:
+        raise refusal(table.path, f"the stamps stand still: {rate} without --time takes the samples as even", "--time")
     if clock.coarse:
         message = (
             f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, which is coarser than the samples "

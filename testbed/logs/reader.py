@@ -157,13 +157,17 @@ def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
     columns, times = kept_columns(plans[0].table, plans, scans)
     for one, values in zip(plans, columns, strict=True):
         key = (one.stamps, one.time_unit)
-        yield one.name, _channel(one, values, times.get(key), scans[key].result() if key in scans else None)
+        clock = scans[key].result() if key in scans and not scans[key].broken else None
+        yield one.name, _channel(one, values, times.get(key), clock)
 
 
 def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
     """Return what looks at the stamps of channels of one group, by column and unit."""
     keys = {(one.stamps, one.time_unit) for one in plans}
-    return {(i, unit): StampScan(plans[0].table, i, unit) for i, unit in keys if i is not None}
+    used = {(one.stamps, one.time_unit) for one in plans if one.time_said}
+    return {
+        (i, unit): StampScan(plans[0].table, i, unit, needed=(i, unit) in used) for i, unit in keys if i is not None
+    }
 
 
 def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, clock: TimeBase | None) -> LogChannel:
@@ -208,7 +212,8 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
 
 def is_sparse(numbers: NDArray[np.float64]) -> bool:
     """Return whether most values are missing, as those of a slow sensor are in the rows of a quick one."""
-    return 2 * int(np.count_nonzero(np.isnan(numbers))) > numbers.size
+    n_missing = int(np.count_nonzero(np.isnan(numbers)))
+    return numbers.size // 2 < n_missing < numbers.size
 
 
 def _own_rows(

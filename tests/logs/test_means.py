@@ -71,7 +71,7 @@ def test_lost_samples_leave_a_mean_out_where_it_has_fewer_than_four_fifths(tmp_p
 def test_what_memory_should_not_hold_is_refused_with_the_option(tmp_path, monkeypatch):
     path = log(tmp_path, SECONDS, DEG)
     monkeypatch.setattr(keeping, "MOST_KEPT", 5000)
-    with pytest.raises(ScenarioError, match="--average 100 keeps means"):
+    with pytest.raises(ScenarioError, match="--average 1000 keeps means"):
         read_log(path)
     assert read_log(path, average=100).channels["w"].values.size == 39
     with pytest.raises(ScenarioError, match="from 1 on"):

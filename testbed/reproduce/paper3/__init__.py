@@ -100,7 +100,7 @@ class DriftProtocol:
 
 
 @dataclass(frozen=True)
-class Case:
+class Contender:
     """A row of the table.
 
     Parameters
@@ -138,7 +138,7 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
     return ThermalRecord(f"{programme}, seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
-def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
+def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
     """Yield the rows of the table for one seed, each trained when it is its turn.
 
     Parameters
@@ -151,14 +151,14 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
     fs = protocol.sample_rate_hz
     one = [cycle("up first", 1000 + seed, fs).record]
     two = [*one, cycle("down first", 2000 + seed, fs).record]
-    yield Case(ORIGINAL, "-", lambda record: record.rate)
-    yield Case(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
-    yield Case("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
+    yield Contender(ORIGINAL, "-", lambda record: record.rate)
+    yield Contender(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
+    yield Contender("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
     ):
-        yield Case(name, "this record", _paper(options, seed))
+        yield Contender(name, "this record", _paper(options, seed))
     for name, method, cycles in (
         ("polynomial", "polynomial", two),
         ("LSSVM", "lssvm", two),
@@ -166,7 +166,7 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
         ("gradient", "gradient", two),
     ):
         model = train(cycles, method=method)
-        yield Case(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
+        yield Contender(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
 
 
 def _paper(options: paper3.PaperOptions, seed: int) -> Compensate:
@@ -219,14 +219,14 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     yield from _printed(rows, found, seeds)
 
 
-def _title(case: Case) -> str:
+def _title(case: Contender) -> str:
     return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
 _PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
 
 
-def _audited(case: Case, thermal: ThermalRecord) -> tuple[Audited, float]:
+def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:
     begin = time.perf_counter()
     plain = case.compensate(thermal.record)
     seconds = time.perf_counter() - begin
