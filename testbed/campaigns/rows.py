@@ -55,6 +55,7 @@ def schema_of(study: Study) -> pa.Schema:
             ("launch", pa.int32()),
             *axes,
             *((name, pa.float64()) for name in NUMBERS),
+            *((name, pa.float64()) for name in pointing_columns(study.cases)),
             ("nees", pa.float64()),
             ("missing", pa.int64()),
             ("lines", lines),
@@ -66,6 +67,19 @@ def schema_of(study: Study) -> pa.Schema:
             ("version", pa.string()),
         ]
     )
+
+
+def pointing_columns(cases: Sequence[Variation]) -> list[str]:
+    """Return the columns of the line of sight: its residual, and RPE over every window of any case [urad].
+
+    Parameters
+    ----------
+    cases : sequence of Variation
+        Of the study; without pointing the columns are null.
+    """
+    aimed = [case.scenario.pointing for case in cases if case.scenario.pointing is not None]
+    windows = {window.key for pointing in aimed for window in pointing.windows}
+    return ["residual_rms_urad", *(f"rpe_urad.{key}" for key in sorted(windows, key=float))]
 
 
 def in_si(scenario: Scenario, key: str, written: Any) -> float | str | None:
@@ -109,9 +123,11 @@ def rows_of(case: Variation, seed: int, metrics: RunMetrics) -> list[dict[str, A
     metrics : RunMetrics
         What came out.
     """
-    found = []
+    found: list[dict[str, Any]] = []
     for kind, sources in (("sensor", metrics.sensors), ("filter", metrics.fusion)):
-        found += [{**_common(case, seed), "source": name, "kind": kind, **_row(one)} for name, one in sources.items()]
+        for name, one in sources.items():
+            sight = _sight(metrics, name) if kind == "filter" else {}
+            found.append({**_common(case, seed), "source": name, "kind": kind, **_row(one), **sight})
     return found
 
 
@@ -139,6 +155,16 @@ def _common(case: Variation, seed: int) -> dict[str, Any]:
         "status": OK,
         "scenario_sha256": case.sha256,
         "version": testbed.__version__,
+    }
+
+
+def _sight(metrics: RunMetrics, name: str) -> dict[str, float | None]:
+    sight = metrics.pointing.get(name)
+    if sight is None:
+        return {}
+    return {
+        "residual_rms_urad": sight.residual_rms_urad,
+        **{f"rpe_urad.{key}": value for key, value in sight.rpe_urad.items()},
     }
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from testbed.cli.console import ruled, terminal
+from testbed.cli.sights import aim_words
 from testbed.cli.understood import doubts, print_facts, print_sheets
 from testbed.scenario.departures import departures
 from testbed.scenario.peaks import played
@@ -86,6 +87,8 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
     _print_departures(scenario)
     print_sheets(console, scenario)
     print_facts(console, facts)
+    if scenario.pointing is not None:
+        console.print(f"pointing: {aim_words(scenario)}", soft_wrap=True, highlight=False)
     console.print("The scenario is valid; --all shows every key.")
 
 

@@ -33,7 +33,7 @@ def prove(requirement: Requirement, candidate: Candidate, seeds: int) -> dict[st
     seeds : int
         Of the sensors' noise; 2 to 10.
     """
-    from testbed.chain.runner import run
+    from testbed.campaigns.evaluate import evaluate
     from testbed.design.search import chosen_scenario
     from testbed.judging.sights import pointing_value
     from testbed.scenario.model import Scenario
@@ -41,7 +41,8 @@ def prove(requirement: Requirement, candidate: Candidate, seeds: int) -> dict[st
     frame = requirement.scenario.frame
     keys = {**chosen_scenario(requirement, candidate), "truth_seed": frame.seed}
     scenario = Scenario.from_dict(keys, requirement.scenario.folder)
-    rows = [run(scenario.with_seed(frame.seed + i)).metrics.pointing[candidate.blend] for i in range(seeds)]
+    drawn = evaluate(scenario, range(frame.seed, frame.seed + seeds))
+    rows = [metrics.pointing[candidate.blend] for metrics in drawn]
     found = {}
     for metric, expected in candidate.values.items():
         values = [float(pointing_value(row, metric) or math.nan) for row in rows]

@@ -86,6 +86,8 @@ def open_table(path: Path, options: TextOptions | None = None) -> Table:
     """
     if not path.is_file():
         raise refusal(path, "expected a recording (a file), got none")
+    if not path.stat().st_size:  # or one of the kernel's, which may keep a reader waiting
+        raise refusal(path, "expected a recording, got an empty file")
     try:
         with path.open("rb") as stream:
             head = stream.read(512)

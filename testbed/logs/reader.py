@@ -11,7 +11,7 @@ import numpy as np
 
 from testbed.errors import Problem, ScenarioError, quoted
 from testbed.logs.chain import FileChain
-from testbed.logs.channel import Log, LogChannel, refuse_uneven
+from testbed.logs.channel import FEWEST, Log, LogChannel, refuse_uneven
 from testbed.logs.clock import ClockScan
 from testbed.logs.formats import open_table
 from testbed.logs.keeping import kept_columns
@@ -188,6 +188,11 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
     if stamps is not None and clock is not None and is_sparse(numbers):
         table, numbers, stamps, clock = _own_rows(table, numbers, stamps, clock)
         notes.append(f"{one.label} has a value in fewer than half of the rows: the others are left out")
+    if one.average > 1 and numbers.size < FEWEST:
+        message = (
+            f"expected at least {FEWEST} means of {one.average} samples, got {numbers.size}: take fewer for a mean"
+        )
+        raise refusal(table.path, message, "--average")
     if clock is not None and one.average > 1:
         refuse_uneven(table, clock)
         notes.append(f"means of {one.average} samples of {clock.rate_hz:.6g} Hz")
