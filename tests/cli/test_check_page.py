@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import testbed
 from testbed.chain.forecast import forecast
 from testbed.cli.check_page import print_page, size_words, warnings
@@ -22,6 +24,9 @@ def test_the_page_says_what_departs_and_fits_a_screen_or_two(tmp_path, capsys):
     assert "motion 1: sine frequency 10 Hz, rate 1 deg/s" in out
     assert size_words(size) in out
     assert "gravity" not in out
+    # Six of one sensor and five of the other: one a decade (docs/starts_and_gaps.md).
+    assert re.search(r"slow noise of mhd_ars: 6 states, within 0.2\d? dB of its density \(kalman\)", out)
+    assert re.search(r"slow noise of mems_gyro: 5 states, within 0.2\d? dB of its density \(kalman\)", out)
 
 
 def test_the_forecast_meets_the_run(tmp_path):

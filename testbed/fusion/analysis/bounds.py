@@ -148,8 +148,8 @@ def _cached(
         search.best(order, np.logspace(*DECADES[order], DECADES[order][1] - DECADES[order][0] + 1)) for order in _ORDERS
     ]
     best = [min(found, key=lambda one: one.rmse) for found in zip(*coarse, strict=True)]
-    for order in sorted({one.order for one in best}):
-        near = np.unique(np.concatenate([one.q * _QUARTERS for one in best if one.order == order]))
+    around = {order: [one.q * _QUARTERS for one in best if one.order == order] for order in _ORDERS}
+    for order, near in ((order, np.unique(found)) for order, found in around.items() if found):
         best = [min(pair, key=lambda one: one.rmse) for pair in zip(best, search.best(order, near), strict=True)]
     return best
 
