@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint bench baseline crash changes readme pictures clean fuzz
+.PHONY: run view test lint docs linkcheck bench baseline crash changes readme pictures clean fuzz
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -36,6 +36,17 @@ lint: .venv/installed-test
 test: lint
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
 
+.venv/installed-docs: .venv/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[docs]"
+	touch $@
+
+# The site, gallery included, in docs/_build/html; needs no network once it is installed, and a warning is an error.
+docs: .venv/installed-docs
+	$(BIN)/python -m sphinx -q -W --keep-going -b html -d docs/_build/doctrees docs docs/_build/html
+
+linkcheck: .venv/installed-docs
+	$(BIN)/python -m sphinx -q -W --keep-going -b linkcheck docs docs/_build/linkcheck
+
 # 100,000 hostile inputs on two workers, in half an hour; what goes wrong is in runs/fuzz.
 fuzz: .venv/installed-test
 	$(BIN)/python -m tests.fuzz --cases 100000 --workers 2
@@ -64,4 +75,4 @@ changes: .venv/installed-test
 	$(BIN)/towncrier build --draft --version "$$($(BIN)/python -c 'import testbed; print(testbed.__version__)')"
 
 clean:
-	rm -rf .venv runs
+	rm -rf .venv runs docs/_build docs/gallery docs/reference/generated

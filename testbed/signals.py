@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from typing import Literal
 
 import numpy as np
 from numba import njit
@@ -59,7 +60,7 @@ def _advance(x, Phi, Gamma, step, C, D, previous, u, y):  # type: ignore[no-unty
 
 
 class LinearFilter:
-    r"""A transfer function in time, exact for an input that is linear between samples (first-order hold).
+    r"""A transfer function in time, exact for an input that is linear between samples (first-order hold), or held.
 
     .. math:: \dot x = A x + B u, \quad y = C x + D u, \quad u(t_k + \tau) = u_k + (u_{k+1} - u_k) \tau / T
 
@@ -72,6 +73,8 @@ class LinearFilter:
         Coefficients in s [rad/s], highest power first; the numerator's degree is at most the denominator's.
     sample_rate_hz : float
         Rate of the samples [Hz].
+    hold : {"first", "zero"}, optional
+        Between samples the input is linear, or stays as it was.
 
     Raises
     ------
@@ -80,7 +83,12 @@ class LinearFilter:
     """
 
     def __init__(
-        self, numerator: FloatArray | list[float], denominator: FloatArray | list[float], sample_rate_hz: float
+        self,
+        numerator: FloatArray | list[float],
+        denominator: FloatArray | list[float],
+        sample_rate_hz: float,
+        *,
+        hold: Literal["first", "zero"] = "first",
     ) -> None:
         A, B, C, D = companion(
             np.atleast_1d(np.asarray(numerator, float)), np.atleast_1d(np.asarray(denominator, float))
@@ -90,6 +98,8 @@ class LinearFilter:
         block[:n, :n], block[:n, n], block[n, n + 1] = A * T, B * T, 1.0
         power = expm(block)
         self._Phi, self._Gamma, self._step = power[:n, :n].copy(), power[:n, n].copy(), power[:n, n + 1].copy()
+        if hold == "zero":
+            self._step[:] = 0.0
         self._C, self._D = C, D
         self._x, self._previous, self._started = np.zeros(n), 0.0, False
 

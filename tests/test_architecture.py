@@ -30,13 +30,17 @@ ROOMS = {
     "models": {"logs"},
     "fusion": set(),
     "sensors": {"models", "allan"},
-    "runs": {"models", "fusion"},
-    "scenario": {"models", "sensors", "fusion"},
+    "pointing": {"metrics", "fusion"},
+    "runs": {"models", "fusion", "pointing"},
+    "scenario": {"models", "sensors", "fusion", "pointing"},
     "report": {"pages", "metrics", "runs"},
     "recording": {"pages", "metrics", "runs"},
     "notebook": {"pages", "runs", "report"},
-    "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion"},
-    "chain": {"scenario", "models", "sensors", "fusion", "runs", "judging", "report", "recording", "notebook"},
+    "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion", "pointing"},
+    "chain": {
+        *("scenario", "models", "sensors", "fusion", "pointing", "runs"),
+        *("judging", "report", "recording", "notebook"),
+    },
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.

@@ -64,17 +64,17 @@ def forecast(scenario: Scenario) -> Forecast:
     """
     samples = scenario.n_time
     chain = Chain(scenario)
-    block = chain.process(min(_WARM, samples))
+    block = chain.tried(min(_WARM, samples))
     tried = min(_TRIED, samples - block.n_time)
     begin = time.process_time()
     if tried:
-        block = chain.process(tried)
-    spent = time.process_time() - begin
-    disk = disk_bytes(block, chain.rates, samples)
+        block = chain.tried(tried)
+    spent = (time.process_time() - begin) / max(tried, 1) + chain.untried_seconds
+    disk = disk_bytes(block, chain.rates, samples, scenario.detail)
     per_block = _WORKING * disk / samples * min(BLOCK, samples)
     return Forecast(
         samples,
-        spent / max(tried, 1) * samples + _SECONDS_PER_BYTE * disk + _FIXED,
+        spent * samples + _SECONDS_PER_BYTE * disk + _FIXED,
         _memory() + _LIBRARIES + round(per_block),
         disk,
         chain.step,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.chain.pointing import LinesOfSight
 from testbed.errors import RunError
 from testbed.fusion import FILTERS
 from testbed.fusion.checked import CheckedFilter
@@ -19,8 +20,9 @@ from testbed.sensors.checked import CheckedSensor
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
+    from testbed.fusion import EstimateBlock
     from testbed.models.turntable.turntable import TruthBlock
     from testbed.scenario.model import FilterSpec, Scenario
     from testbed.sensors.base import SensorStage
@@ -73,9 +75,23 @@ class Chain:
             **rates,
             **dict.fromkeys(self._fusion, fastest),
         }
+        self._pointing = LinesOfSight(scenario, self.rates)
 
     def process(self, n_time: int) -> RunBlock:
         """Advance everything by `n_time` base samples."""
+        return self._block(n_time, CheckedFilter.process)
+
+    def tried(self, n_time: int) -> RunBlock:
+        """Advance a trial by `n_time` base samples, in which shipped filters stay undefined (`CheckedFilter.tried`)."""
+        return self._block(n_time, CheckedFilter.tried)
+
+    @property
+    def untried_seconds(self) -> float:
+        """About how long the filters take, per base sample, for what `tried` leaves out [s]."""
+        steps = {name: self.rates[name] / self.rates["base"] for name in self._fusion}
+        return sum(steps[name] * stage.untried_seconds for name, stage in self._fusion.items())
+
+    def _block(self, n_time: int, estimated: Callable[[CheckedFilter, Any], EstimateBlock]) -> RunBlock:
         command = self._motion.process(n_time)
         truth = self.turntable.process(command, self._motion.peek(self.turntable.lookahead))
         readings, profiles = {}, {}
@@ -83,7 +99,8 @@ class Chain:
             readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: stage.process(readings) for name, stage in self._fusion.items()}
+        estimates = {name: estimated(stage, readings) for name, stage in self._fusion.items()}
+        rates = {name: estimate.rate for name, estimate in estimates.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         return RunBlock(
             command.start,
@@ -94,6 +111,7 @@ class Chain:
             profiles,
             temperatures={name: stage.temperature for name, stage in thermal.items()},
             drifts={name: stage.drift for name, stage in thermal.items()},
+            pointing=self._pointing.process(truth.rate, truth.sensor_rate, readings, rates),
         )
 
     def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:

@@ -124,7 +124,7 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         )
         for part in blocks:
             if not part.start:
-                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time))
+                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time, scenario.detail))
             reach(part.start / chain.rates["base"])
             for sink in (netcdf, judge, recording):
                 sink.write(part)

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rich.console import Console
 from rich.table import Column, Table
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def terminal() -> Console:
@@ -16,3 +21,14 @@ def terminal() -> Console:
 def ruled(*headings: str, title: str | None = None) -> Table:
     """Return an empty table whose cells are folded where the terminal is narrow, never cut."""
     return Table(*(Column(heading, overflow="fold") for heading in headings), title=title, title_justify="left")
+
+
+def print_written(place: Path) -> None:
+    """Print where something was written.
+
+    Parameters
+    ----------
+    place : Path
+        A file or a folder.
+    """
+    terminal().print(f"wrote {place}", soft_wrap=True)

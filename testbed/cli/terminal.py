@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from testbed.cli.console import terminal
+from testbed.cli.sights import print_sights
 from testbed.pages.numbers import bounded
 from testbed.pages.palette import color_of
 from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number, rate_text
@@ -57,6 +58,7 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     _print_beliefs(console, metrics.fusion)
     _print_claims(console, metrics.fusion)
     _print_table(console, metrics.turntable, unit)
+    print_sights(console, metrics.pointing)
     for bound in metrics.expectations:
         verdict = Text("met", "green") if bound.met else Text("MISSED", "red")
         console.print(f"expected {bound.subject} {bound.metric} {bound.bound}: {number(bound.value)}", verdict)

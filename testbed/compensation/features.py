@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Share of the trained span by which a feature may leave it before the model counts as extrapolating.
 _MARGIN = 0.05
+# Of the second pole, in samples: below this a slope is the rounding of the readings.
+_LEAST_DELAY = 1e-6
 
 
 @njit(cache=True)
@@ -155,6 +157,11 @@ class FeatureStage:
         Which.
     sample_rate_hz : float
         Rate of the readings [Hz].
+
+    Raises
+    ------
+    ValueError
+        If it is so low that slopes cannot be formed.
     """
 
     def __init__(self, features: Features, sample_rate_hz: float) -> None:
@@ -163,6 +170,12 @@ class FeatureStage:
         self._gains = -np.expm1(-1.0 / (checked_rate(sample_rate_hz) * times))
         # By which the second pole lags a ramp: smoothing less half a sample.
         self._delay = (1.0 / self._gains[1] - 1.0) / sample_rate_hz
+        if features.slopes and self._delay * sample_rate_hz < _LEAST_DELAY:
+            msg = (
+                f"sample rate: expected several readings within the {features.smoothing:.3g} s over which slopes are "
+                f"formed, got one in {1.0 / sample_rate_hz:.3g} s"
+            )
+            raise ValueError(msg)
         self._plays = np.array(features.plays, dtype=np.float64)
         self._state: FloatArray | None = None
 

@@ -10,7 +10,6 @@ from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figu
 from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.pages.template import render
-from testbed.runs.atomic import write_text
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
@@ -51,21 +50,20 @@ class Audited:
 
 
 def write_audit(audited: Audited, folder: Path) -> Path:
-    """Write audit.json, allan.csv, gains.csv and audit.html, each whole or not at all.
+    """Write audit.json, allan.csv, gains.csv and audit.html.
 
     Parameters
     ----------
     audited : Audited
         To write.
     folder : Path
-        Made if it does not exist.
+        Made if it does not exist; whoever wants it whole or not at all writes it beside its place (`RunFolder`).
 
     Returns
     -------
     Path
         The page.
     """
-    # All made before the first is written: an interrupt does not leave half a folder.
     texts = {
         "audit.json": json.dumps(audit_document(audited), indent=2, allow_nan=False) + "\n",
         "gains.csv": _gains(audited.audit),
@@ -74,7 +72,7 @@ def write_audit(audited: Audited, folder: Path) -> Path:
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
-        write_text(folder / name, text)
+        (folder / name).write_text(text, encoding="utf-8")
     return folder / "audit.html"
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
+from testbed._version import __version__
 from testbed.compensation import PAPER, paper3
 from testbed.compensation.document import ModelDocument, sealed
 from testbed.compensation.model_only import METHODS, DriftModel, train
@@ -21,7 +22,7 @@ from testbed.drift.records import ThermalRecord, check_options, read_thermal
 from testbed.errors import Problem, ScenarioError, UnknownNameError, shortened
 from testbed.inputs.files import read_bytes
 from testbed.runs.atomic import write_text
-from testbed.runs.folder import failing_as_run_error
+from testbed.runs.folder import RunFolder, failing_as_run_error
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
@@ -227,22 +228,23 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     Raises
     ------
     ScenarioError
-        If model or record cannot be read, or the record is too short.
+        If model or record cannot be read, the record is too short, or `out` cannot be written or holds something else.
+    RunError
+        If the disk is full.
     """
     check_options([source], columns)
-    if out.exists() and not out.is_dir():
-        raise ScenarioError([Problem("expected a folder to write, got a file", key="--out", file=str(out))])
     trained = None if model == PAPER else _read_document(Path(model))
     thermal = read_thermal(source, columns)
-    tell(f"compensating {thermal}")
-    try:
-        audited = (
-            _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
-        )
-    except ValueError as error:
-        raise ScenarioError([Problem(str(error), file=str(source))]) from error
-    with failing_as_run_error(str(out)):
-        write_audit(audited, out)
+    with RunFolder(out) as folder, failing_as_run_error(str(out)):
+        tell(f"compensating {thermal}")
+        try:
+            audited = (
+                _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
+            )
+        except ValueError as error:
+            raise ScenarioError([Problem(str(error), file=str(source))]) from error
+        write_audit(audited, folder.path)
+        folder.finish({"audited": audited.method, "version": __version__})
     return audited
 
 

@@ -128,16 +128,12 @@ class BlockFilter:
     # What a method promises; the contract tests hold every method to what it says here (docs/filters.md).
     needs_both: ClassVar[bool] = False
     """It divides the band between two sensors, and refuses one alone or three."""
-    spike_leaves: ClassVar[float] = 1.1
-    """Error after a single bad reading, 0.64 s later, over that of a run without it: at most."""
     caution: ClassVar[str] = ""
     """Where it does not hold; printed beside its results."""
     start_leaves: ClassVar[tuple[float, float] | None] = None
     """Rms error 10 s after a start in mid-motion, and inside 6 deg/s [rad/s]: at most; None promises nothing."""
     fault_leaves: ClassVar[tuple[float, float]] = (math.radians(1.5), math.radians(0.1))
     """Error while a sensor is lost or lies for a second of 3 Hz, 1 deg/s, and rms 3 s later [rad/s]: at most."""
-    blames_the_other: ClassVar[str] = ""
-    """Why a sensor at its rail spoils the trust in the other one, if it does."""
     departs: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Ranges of ``nees`` and ``nis_<sensor>`` where its own model is the truth, if it is not consistent even then."""
     dishonest: ClassVar[str] = ""
@@ -186,9 +182,31 @@ class BlockFilter:
         Z = self.schedule.spread(readings)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
         Z.flags.writeable = False
-        names = self.rows.names(self.schedule.sensors)
-        out = np.full((HEADER_ROWS + len(names), Z.shape[1]), np.nan)
+        out = self._rows_of(Z.shape[1])
         self._advance(Z, out)
-        shown = {name: row for name, row in zip(names, out[HEADER_ROWS:], strict=True) if name is not None}
-        shown |= {f"gated_{name}": count for name, count in zip(self.schedule.sensors, gated, strict=True)}
+        return self._shown(out, gated)
+
+    def blank(self, n_time: int) -> EstimateBlock:
+        """Return a block in which everything is undefined: what the filter gives, without the work.
+
+        Parameters
+        ----------
+        n_time : int
+            Its length, at the fastest rate.
+        """
+        return self._shown(self._rows_of(n_time), np.zeros((len(self.schedule.sensors), n_time)))
+
+    @property
+    def step_seconds(self) -> float:
+        """About how long a step takes, compiled, on a core of 2020 [s]; `benchmarks/bench_forecast.py` prints it."""
+        return 3e-7
+
+    def _rows_of(self, n_time: int) -> FloatArray:
+        return np.full((HEADER_ROWS + len(self.rows.names(self.schedule.sensors)), n_time), np.nan)
+
+    def _shown(self, out: FloatArray, gated: FloatArray) -> EstimateBlock:
+        sensors = self.schedule.sensors
+        rows = zip(self.rows.names(sensors), out[HEADER_ROWS:], strict=True)
+        shown = {name: row for name, row in rows if name is not None}
+        shown |= {f"gated_{name}": count for name, count in zip(sensors, gated, strict=True)}
         return EstimateBlock(out[RATE], out[STD], shown)

@@ -65,6 +65,25 @@ class CheckedFilter:
         self._sample += n_time
         return checked
 
+    def tried(self, readings: Mapping[str, FloatArray]) -> EstimateBlock:
+        """Return the estimate of the next block of a trial: of a shipped filter, whose kernels would take seconds to
+        compile and whose faults show when it is built, only what it gives, undefined.
+
+        Parameters
+        ----------
+        readings : mapping of str to ndarray, shape (n_sensor_samples,)
+            As for `process`, which a plug-in gets them by.
+        """
+        if not self._shipped:
+            return self.process(readings)
+        blank: EstimateBlock = self._inner.blank(max(values.size for values in readings.values()))
+        return blank
+
+    @property
+    def untried_seconds(self) -> float:
+        """About how long a step takes of which `tried` does nothing [s]."""
+        return float(self._inner.step_seconds) if self._shipped else 0.0
+
     def _foreign(self, readings: Mapping[str, FloatArray]) -> EstimateBlock:
         try:
             with running("raised"):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from testbed.errors import Problem, ScenarioError, shortened_path
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Mapping
 
 
 def read_bytes(path: Path, most: int, what: str) -> bytes:
@@ -43,3 +44,32 @@ def read_bytes(path: Path, most: int, what: str) -> bytes:
     if len(content) > most:
         raise ScenarioError([Problem(f"expected {what} of at most {most} bytes, got more", file=str(path))])
     return content
+
+
+def beside_scenario(path: Path, context: Mapping[str, Any]) -> Path:
+    """Return a path that a scenario names, relative to the scenario's folder and not to where the command is typed.
+
+    Parameters
+    ----------
+    path : Path
+        As it stands there.
+    context : mapping
+        Of the validation: `folder` of the scenario, nothing for one that Python gives; `allow_outside`.
+
+    Raises
+    ------
+    ValueError
+        If it leads out of that folder and may not, or is no path.
+    """
+    if not context.get("folder"):
+        return path
+    folder = Path(context["folder"]).resolve()
+    try:
+        place = (folder / path).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        msg = "expected a path"
+        raise ValueError(msg) from error
+    if not place.is_relative_to(folder) and not context.get("allow_outside"):
+        msg = "expected a file in the scenario's folder; --allow-outside (allow_outside=True) lets it read others"
+        raise ValueError(msg)
+    return place

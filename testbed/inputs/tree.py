@@ -16,6 +16,7 @@ from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent, ScalarEvent
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.parser import Parser
+from ruamel.yaml.tag import Tag
 
 from testbed.errors import Problem, ScenarioError, quoted, shortened
 from testbed.inputs.files import read_bytes
@@ -31,6 +32,7 @@ MOST_NODES = 20_000
 MOST_DEPTH = 24
 MOST_CHARACTERS = 4096
 MOST_DIGITS = 64
+_DATE, _TEXT = Tag(suffix="tag:yaml.org,2002:timestamp"), Tag(suffix="tag:yaml.org,2002:str")
 _NUMBER = re.compile(r"[-+.]*\d[\w.+-]*")
 
 
@@ -81,7 +83,7 @@ def read_yaml(path: Path, what: str) -> Tree:
         message, line = f"repeated key {_repeated(error)}", _line_of(error)
     except MarkedYAMLError as error:
         message, line = f"not YAML: {shortened(str(error.problem or error.context))}", _line_of(error)
-    except Exception as error:  # noqa: BLE001 - the library answers a month 13 or a version 1.9 with what it met
+    except Exception as error:  # noqa: BLE001 - the library answers a version 1.9 with what it met
         reason = str(error).splitlines()[0] if str(error) else "unreadable characters"
         message, line = f"not YAML: {shortened(reason)}", None
     raise ScenarioError([Problem(message, file=str(path), line=line)])
@@ -103,6 +105,7 @@ def _tree(text: str) -> Tree:
     if root is None:
         return Tree(None, {})
     _check_keys(root)
+    _keep_dates(root)
     return Tree(yaml.constructor.construct_document(root), dict(_lines(root, ())))
 
 
@@ -116,6 +119,19 @@ def _check_keys(node: Any) -> None:
     elif isinstance(node, SequenceNode):
         for value in node.value:
             _check_keys(value)
+
+
+def _keep_dates(node: Any) -> None:
+    """Leave dates as they were written: YAML 1.2 knows none, and here they are names, or stamps with an epoch."""
+    if isinstance(node, MappingNode):
+        for entry in node.value:
+            for part in entry:
+                _keep_dates(part)
+    elif isinstance(node, SequenceNode):
+        for value in node.value:
+            _keep_dates(value)
+    elif node.ctag == _DATE:
+        node.ctag = _TEXT
 
 
 def _lines(node: Any, key: Key) -> Iterator[tuple[Key, int]]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from testbed.allan import Coefficient
-    from testbed.judging.allan_records import Record
+    from testbed.judging.allan_records import RateRecord
 
 FORMATS = ("svg", "png", "pdf")
 _PANEL_IN = (5.0, 4.2)
@@ -80,7 +80,7 @@ TERMS = (
 class Analysis:
     """A record, its curve, the part of it that was fitted, and the fit."""
 
-    record: Record
+    record: RateRecord
     curve: AllanCurve
     fitted: AllanCurve
     fit: AllanFit
@@ -155,12 +155,12 @@ def _holds(curve: AllanCurve, low: float, high: float) -> bool:
     return judge_fit(curve.between(low * 0.999, high * 1.001)).p_value >= _COMFORT
 
 
-def analyse(record: Record, min_tau: float | None = None, max_tau: float | None = None) -> Analysis:
+def analyse(record: RateRecord, min_tau: float | None = None, max_tau: float | None = None) -> Analysis:
     """Return curve and fit of a record.
 
     Parameters
     ----------
-    record : Record
+    record : RateRecord
         From `allan_records`, or made of an array.
     min_tau, max_tau : float, optional
         Averaging times between which to fit [s].

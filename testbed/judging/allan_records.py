@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Record:
+class RateRecord:
     """A rate record.
 
     Parameters
@@ -41,6 +41,8 @@ class Record:
         What the reader found, took for granted or left out.
     word : float
         To what the rate is rounded [rad/s]; 0 if not known.
+    signal : str
+        ``sensors/<name>``, ``fusion/<name>``, ``truth`` or ``commanded`` of a run; empty of a recording.
     """
 
     name: str
@@ -49,11 +51,12 @@ class Record:
     content: str
     notes: tuple[str, ...] = ()
     word: float = 0.0
+    signal: str = ""
 
 
 def read(
     source: Path, wanted: Selection | None = None, text: TextOptions | None = None, sensor: str | None = None
-) -> list[Record]:
+) -> list[RateRecord]:
     """Return the records that the command line asks for.
 
     Parameters
@@ -86,7 +89,7 @@ def read(
     return [as_record(channel, source.stem if len(channels) == 1 else channel.name) for channel in channels]
 
 
-def as_record(channel: LogChannel, name: str) -> Record:
+def as_record(channel: LogChannel, name: str) -> RateRecord:
     """Return a channel of a recording as a record: on an even grid, lost samples NaN.
 
     Parameters
@@ -105,10 +108,10 @@ def as_record(channel: LogChannel, name: str) -> Record:
     content = f"{channel.label} of {channel.table.path} ({'; '.join([channel.table.format, *channel.assumed])})"
     # The rounding of increments and angles is no noise of its own in each sample of the rate.
     word = word_of(channel) if channel.kind == "rate" else 0.0
-    return Record(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
+    return RateRecord(name, rate.even(), rate.rate_hz, content, tuple(remarks(channel)), word)
 
 
-def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
+def read_run(folder: Path, sensor: str | None = None) -> list[RateRecord]:
     """Return what each sensor of a run read after settling, less what it reads of the same truth without noise.
 
     So neither the motion nor the sensor's dynamics show, on a moving table as at standstill.
@@ -122,7 +125,7 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
 
     Returns
     -------
-    list of Record
+    list of RateRecord
         In the order of the scenario.
 
     Raises
@@ -148,7 +151,9 @@ def read_run(folder: Path, sensor: str | None = None) -> list[Record]:
         if not np.isfinite(noise).any():
             raise refusal(folder, "expected readings, got none", f"sensors.{name}")
         content = f"{name} of {scenario.name}, less its noise-free reading, from {scenario.frame.settle:g} s on"
-        records.append(Record(f"{scenario.name}_{name}", noise, instrument.sample_rate, content))
+        records.append(
+            RateRecord(f"{scenario.name}_{name}", noise, instrument.sample_rate, content, signal=f"sensors/{name}")
+        )
     return records
 
 

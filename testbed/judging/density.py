@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from testbed.judging.allan_records import Record
+    from testbed.judging.allan_records import RateRecord
     from testbed.logs.selection import Selection, TextOptions
     from testbed.signals import FloatArray
 
@@ -52,7 +52,7 @@ class RateDensityEstimate:
 
     Parameters
     ----------
-    record : Record
+    record : RateRecord
         What it is of; its mean was taken off.
     freq_hz : ndarray, shape (n_freq,)
         Frequency [Hz], above zero.
@@ -68,7 +68,7 @@ class RateDensityEstimate:
         What was done to the record.
     """
 
-    record: Record
+    record: RateRecord
     freq_hz: FloatArray
     density: FloatArray
     sides: int
@@ -142,13 +142,13 @@ class RateDensityEstimate:
 
 
 def estimate_density(
-    record: Record, method: str = "welch", segment: float | None = None, *, two_sided: bool = False
+    record: RateRecord, method: str = "welch", segment: float | None = None, *, two_sided: bool = False
 ) -> RateDensityEstimate:
     """Return the density of a record less its mean.
 
     Parameters
     ----------
-    record : Record
+    record : RateRecord
         Even samples, NaN where one is lost.
     method : str
         ``welch`` (Hann window, half overlap) or ``multitaper`` (seven tapers over the whole record).
@@ -182,7 +182,9 @@ def estimate_density(
     return RateDensityEstimate(record, freq[1:], density[1:] * (2.0 / sides), sides, freedom, words, tuple(notes))
 
 
-def _welch(rate: FloatArray, record: Record, segment: float | None) -> tuple[FloatArray, FloatArray, float, str, bool]:
+def _welch(
+    rate: FloatArray, record: RateRecord, segment: float | None
+) -> tuple[FloatArray, FloatArray, float, str, bool]:
     """Return frequency, two-sided density, degrees of freedom, words, and whether lost samples were bridged."""
     wanted = min(rate.size // _SEGMENTS, LONGEST_SEGMENT) if segment is None else round(segment * record.sample_rate_hz)
     n_segment = min(next_fast_len(max(wanted, 1), real=True), LONGEST_SEGMENT, rate.size)
@@ -203,7 +205,7 @@ def _welch(rate: FloatArray, record: Record, segment: float | None) -> tuple[Flo
 
 
 def _multitaper(
-    rate: FloatArray, record: Record, segment: float | None
+    rate: FloatArray, record: RateRecord, segment: float | None
 ) -> tuple[FloatArray, FloatArray, float, str, bool]:
     if segment is not None:
         raise ScenarioError([Problem("expected Welch's method with it: --method welch", key="--segment")])
@@ -221,12 +223,12 @@ def _bridge(rate: FloatArray) -> FloatArray:
     return bridged
 
 
-def difference(record: Record, other: Record) -> Record:
+def difference(record: RateRecord, other: RateRecord) -> RateRecord:
     """Return a record less another, at the instants of the slower one.
 
     Parameters
     ----------
-    record, other : Record
+    record, other : RateRecord
         Both begin at the same instant; one rate is a whole multiple of the other.
 
     Raises

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from testbed.pages.palette import FILTERS, SENSORS
+from testbed.pages.palette import color_of
 from testbed.pages.svg import STYLE
 from testbed.units import DEG
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _SIZE_IN = (7.0, 7.5)
 # Lines drawn in a figure: more points than pixels only make the file large.
 _POINTS = 4000
-_COLORS = (*SENSORS, *FILTERS)
 
 
 def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
@@ -29,7 +28,7 @@ def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
     Parameters
     ----------
     estimates : sequence of RateDensityEstimate
-        One colour each.
+        Each in the colour of its name.
 
     Returns
     -------
@@ -39,8 +38,8 @@ def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=_SIZE_IN, layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
-        for k, one in enumerate(estimates):
-            color, shown = _COLORS[k % len(_COLORS)], _shown(one.freq_hz.size)
+        for one in estimates:
+            color, shown = color_of(one.record.signal or f"columns/{one.record.name}"), _shown(one.freq_hz.size)
             freq, density = one.freq_hz[shown], np.sqrt(one.density[shown]) / DEG
             low, high = np.sqrt(one.limits)
             top.fill_between(freq, density * low, density * high, color=color, alpha=0.25, linewidth=0)

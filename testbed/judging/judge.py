@@ -9,6 +9,7 @@ import numpy as np
 
 from testbed.fusion.belief import declared
 from testbed.judging.bounds import Bounds
+from testbed.judging.sights import pointing_judges, pointing_value
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics, floor_density
@@ -48,6 +49,7 @@ class Judge:
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
         self._table = TableMetrics(scenario, step)
+        self._sights = pointing_judges(scenario, rates["base"])
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
@@ -58,6 +60,8 @@ class Judge:
             error, settled = self._add(name, block, estimate.rate, estimate.std)
             self._gated.setdefault(name, {}).update(_gated(estimate.diagnostics))
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
+        for name, sight in block.pointing.items():
+            self._sights[name].process(sight, block.truth.rate)
 
     def _add(self, name: str, block: RunBlock, rate: Any, std: Any) -> tuple[Any, int]:
         """Add a block of readings or estimates; return the error after `settle`, and at which sample of the block that
@@ -108,6 +112,7 @@ class Judge:
             of_lines = self._of_run(bounds, name)[1]
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
+        sights = {name: sight.result() for name, sight in self._sights.items()}
         from testbed.judging.budget import budget_summary
 
         found = {
@@ -122,7 +127,8 @@ class Judge:
             "bounds_reason": bounds.reason or why,
             "floor_density": _floor_curve(psds, frame.bandwidth) if psds else None,
             "budget": budget_summary(psds, frame.bandwidth) if psds else None,
-            "expectations": self._expectations({**sensors, **fusion}),
+            **({"pointing": sights} if sights else {}),
+            "expectations": self._expectations({**sensors, **fusion}, sights),
             "versions": dict(versions or {}),
             "setup": departures(self._scenario),
             "plugins": [asdict(plugin) for plugin in self._scenario.plugins],
@@ -158,10 +164,14 @@ class Judge:
         whole, *alone = (in_deg(one.rmse) for one in best)
         return whole, {freq: value for (freq, _), value in zip(lines, alone, strict=True)}
 
-    def _expectations(self, results: Mapping[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    def _expectations(
+        self, results: Mapping[str, dict[str, Any]], sights: Mapping[str, dict[str, Any]]
+    ) -> list[dict[str, Any]]:
         rows = []
         for bound in self._scenario.expect:
             value = results[bound.subject].get(bound.metric)
+            if value is None and bound.subject in sights:
+                value = pointing_value(sights[bound.subject], bound.metric)
             rows.append(
                 {
                     "subject": bound.subject,

@@ -16,7 +16,7 @@ from testbed.pages.numbers import significant
 
 if TYPE_CHECKING:
     from testbed.allan import AllanCurve
-    from testbed.judging.allan_records import Record
+    from testbed.judging.allan_records import RateRecord
 
 _UNIFORM = 1.0 / 12.0
 # Noise of half a word, and its rounding, in words squared.
@@ -25,19 +25,19 @@ _LEAST = 0.25 + _UNIFORM
 _NOTHING = 1e-3
 
 
-def sample_variance(record: Record) -> float:
+def sample_variance(record: RateRecord) -> float:
     """Return half the mean square of the steps from sample to sample [rad^2/s^2], the variance of white noise."""
     steps = np.diff(record.rate)
     known = steps[np.isfinite(steps)]
     return float(known @ known) / (2.0 * max(known.size, 1))
 
 
-def is_rounding(record: Record) -> bool:
+def is_rounding(record: RateRecord) -> bool:
     """Return whether the noise of a record is less than half a word of its rounding."""
     return record.word > 0.0 and sample_variance(record) < _LEAST * record.word**2
 
 
-def rounding_text(record: Record) -> str:
+def rounding_text(record: RateRecord) -> str:
     """Return what can be said of such a record: an upper limit of its white noise.
 
     The readings differ from the rate by half a word at most, so that the standard deviation of the rate is at most
@@ -52,14 +52,14 @@ def rounding_text(record: Record) -> str:
     )
 
 
-def without_rounding(curve: AllanCurve, record: Record) -> AllanCurve:
+def without_rounding(curve: AllanCurve, record: RateRecord) -> AllanCurve:
     """Return the curve less the variance w^2 / (12 m) of rounding, where that is something.
 
     Parameters
     ----------
     curve : AllanCurve
         Of the record.
-    record : Record
+    record : RateRecord
         With its word.
     """
     if not _matters(record):
@@ -69,7 +69,7 @@ def without_rounding(curve: AllanCurve, record: Record) -> AllanCurve:
     return replace(curve, deviation=curve.deviation * scale, lower=curve.lower * scale, upper=curve.upper * scale)
 
 
-def taken_off(record: Record) -> str:
+def taken_off(record: RateRecord) -> str:
     """Return what `without_rounding` did, as a sentence; empty if nothing."""
     if not _matters(record):
         return ""
@@ -77,6 +77,6 @@ def taken_off(record: Record) -> str:
     return f"rounding to words of {word:.4g} deg/s, {100.0 * share:.2g} % of the variance of a sample, is taken off"
 
 
-def _matters(record: Record) -> bool:
+def _matters(record: RateRecord) -> bool:
     added = record.word**2 * _UNIFORM
     return added > 0.0 and not is_rounding(record) and added >= _NOTHING * sample_variance(record)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError, UnknownNameError
-from testbed.judging.allan_records import Record
+from testbed.judging.allan_records import RateRecord
 from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
+def run_records(folder: Path, wanted: Sequence[str]) -> list[RateRecord]:
     """Return signals of a run from the end of settling on.
 
     Parameters
@@ -28,7 +28,7 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
 
     Returns
     -------
-    list of Record
+    list of RateRecord
         In that order.
 
     Raises
@@ -48,5 +48,7 @@ def run_records(folder: Path, wanted: Sequence[str]) -> list[Record]:
         time = np.asarray(signals[name].time)
         rate_hz = (time.size - 1) / float(time[-1] - time[0])
         first = math.ceil(round((settle - float(time[0])) * rate_hz, 6))
-        records.append(Record(name, np.asarray(signals[name].rate)[max(first, 0) :], rate_hz, f"{name} of {folder}"))
+        rate = np.asarray(signals[name].rate)[max(first, 0) :]
+        group = "sensors/" if name in run.sensors else "fusion/" if name in run.fusion else ""
+        records.append(RateRecord(name, rate, rate_hz, f"{name} of {folder}", signal=f"{group}{name}"))
     return records

@@ -52,6 +52,8 @@ class LogChannel:
         The file.
     largest : float, optional
         Range of the sensor [SI].
+    factor : float
+        SI value of a one in the file.
     """
 
     name: str
@@ -67,6 +69,7 @@ class LogChannel:
     notes: tuple[str, ...]
     table: Table
     largest: float | None = None
+    factor: float = 1.0
 
     def even(self) -> FloatArray:
         """Return the values on an even grid of `rate_hz`, NaN where samples are lost.
@@ -163,7 +166,8 @@ def refuse_uneven(table: Table, clock: TimeBase) -> None:
     ScenarioError
         If a stamp goes back or stands twice, or a step is no multiple of the usual one.
     """
-    rate = f"--rate '{clock.mean_rate_hz:.6g} Hz'"
+    mean = f"'{clock.mean_rate_hz:.6g} Hz'" if np.isfinite(clock.mean_rate_hz) else "with the true rate"
+    rate = f"--rate {mean}"
     if clock.coarse:
         message = (
             f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, which is coarser than the samples "

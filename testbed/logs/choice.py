@@ -11,7 +11,7 @@ from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap, load_map
 from testbed.logs.options import quantity, refusal
 from testbed.logs.plan import ROTATIONS, channels_of, labels, measured_quantity, option_keys, plan, time_columns
-from testbed.logs.reader import is_map, read_map, read_plans
+from testbed.logs.reader import averaged, is_map, read_map, read_plans
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,7 +56,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     columns = wanted.column or _rotations(table, wanted)
     maps = [channel_map(column=c, unit=wanted.unit, scale=wanted.scale, kind=wanted.kind, time=time) for c in columns]
     plans = [plan(one.column if wanted.column else _name(table, one), one, table) for one in maps]
-    channels = list(read_plans(plans).values())
+    channels = list(read_plans(averaged(plans, wanted.average or 1)).values())
     if rate_hz is not None and wanted.time is not None:
         _refuse_contradiction(channels[0], rate_hz)
     return channels
@@ -91,7 +91,7 @@ def _mapped(path: Path, wanted: Selection) -> list[LogChannel]:
     place = wanted.map or path
     if wanted.given:
         raise refusal(place, f"says this: leave out {', '.join(wanted.given)}", "--map")
-    channels = read_map(None if wanted.map is None else path, load_map(place)).channels
+    channels = read_map(None if wanted.map is None else path, load_map(place), wanted.average or 1).channels
     unknown = [name for name in wanted.column or [] if name not in channels]
     if unknown:
         raise refusal(place, str(UnknownNameError("channel", unknown[0], channels)), "--column")

@@ -9,11 +9,13 @@ import codecs
 import csv
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from testbed.errors import quoted, shortened
 from testbed.logs.names import clean_unit, quantity_of
 from testbed.logs.options import refusal
+from testbed.logs.ornaments import Ornaments, find_ornaments
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,6 +36,7 @@ _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)
 ISO = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?(Z|[+-]\d\d:?\d\d)?")
 CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")
 _MISSING = {"", "na", "n/a", "null", "none", "-"}
+_HEX = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 _UNITLESS = re.compile(r"[\[(].*[\])]|-*")
 
 
@@ -52,11 +55,17 @@ class Dialect:
     names, units : tuple of str
         Of the columns; empty where there is no header, no line of units.
     kinds : tuple of str
-        Of each column: ``integer``, ``number``, ``iso``, ``clock``, ``text``.
+        Of each column: ``integer``, ``number``, ``hex``, ``iso``, ``clock``, ``text``.
     preamble : dict
         Values of ``key,value`` lines and comments before the header.
     header_line, unit_line : int, optional
         Where they stand.
+    ornaments : Ornaments
+        What is taken off each row.
+    only : str, optional
+        Word that a row holds.
+    hex_bits : dict
+        Bits of the words of each column of hexadecimal numbers: 8, 16 or 32 by the most digits in the head.
     """
 
     encoding: str
@@ -70,6 +79,26 @@ class Dialect:
     preamble: dict[str, str]
     header_line: int | None
     unit_line: int | None
+    ornaments: Ornaments
+    only: str | None
+    hex_bits: dict[int, int]
+
+    def fields(self, text: str) -> list[str]:
+        """Return the fields of a row."""
+        return fields_of(self.ornaments.off(text.rstrip("\r\n")), self.separator)
+
+    @property
+    def raw_encoding(self) -> str:
+        """Codec of the bytes of a row: UTF-8 where the file's is a form of Unicode."""
+        return "utf-8" if self.encoding.startswith("utf") else self.encoding
+
+    def is_row(self, text: str) -> bool:
+        """Return whether a line below the head is a row: no blank, no comment, and with the word that all have."""
+        return (
+            bool(text.strip())
+            and not text.lstrip().startswith(COMMENTS)
+            and (self.only is None or bool(re.search(word_pattern(self.only), text)))
+        )
 
     def __str__(self) -> str:
         """Say what was found, in words."""
@@ -78,6 +107,9 @@ class Dialect:
         parts.append(f"header in line {self.header_line}" if self.header_line else "no header")
         if self.unit_line:
             parts.append(f"units in line {self.unit_line}")
+        parts += [f"hexadecimal words of {bits} bits with their sign" for bits in sorted(set(self.hex_bits.values()))]
+        if self.ornaments.swaps:
+            parts.append(f"without {self.ornaments}")
         return ", ".join([*parts, f"rows from line {self.skip + 1}"])
 
 
@@ -109,14 +141,39 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     lines = _lines(path, head, encoding, complete=complete)
     rest = [(number, text) for number, text in lines if number > (options.skip or 0)]
     content = [(number, text) for number, text in rest if not text.lstrip().startswith(COMMENTS)]
+    if options.only is not None:
+        content = [(number, text) for number, text in content if re.search(word_pattern(options.only), text)]
     if not content:
-        raise refusal(path, "expected a column of numbers, got nothing")
-    # In a short file the last third: preamble and header stand above it.
-    tail = content[-min(_SAMPLE, -(-len(content) // 3)) :]
+        only = "" if options.only is None else f" with the word {options.only!r}"
+        raise refusal(path, f"expected a column of numbers, got no line{only}")
+    ornaments = find_ornaments([text for _, text in _tail(content)])
+    if ornaments.swaps:
+        content = [(number, ornaments.off(text)) for number, text in content]
+    tail = _tail(content)
     separator, decimal = _marks(path, [text for _, text in tail], options)
     _refuse_two_readings(path, [text for _, text in [*content[:_SAMPLE], *tail]], separator, decimal, options)
     rows = [(number, fields_of(text, separator)) for number, text in content]
-    return _parts(path, encoding, separator, decimal, rows, rest)
+    found = _parts(path, encoding, separator, decimal, rows, rest)
+    names, units = _said_in_rows(found, ornaments)
+    return replace(found, names=names, units=units, ornaments=ornaments, only=options.only)
+
+
+def word_pattern(word: str) -> str:
+    """Return the pattern of a word that stands alone in a line."""
+    return rf'(?:^|(?<=[\s,;|"])){re.escape(word)}(?=[\s,;|":=]|$)'
+
+
+def _tail(content: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Return lines that are rows, the last of the head; in a short file its last third."""
+    return content[-min(_SAMPLE, -(-len(content) // 3)) :]
+
+
+def _said_in_rows(found: Dialect, ornaments: Ornaments) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names and units of the head, or those that the rows themselves give."""
+    n_named = len(found.kinds)
+    names = ornaments.labels if not found.names and len(ornaments.labels) == n_named else found.names
+    units = ornaments.units if not found.units and len(ornaments.units) == n_named else found.units
+    return names, units
 
 
 def find_encoding(path: Path, head: bytes) -> str:
@@ -165,7 +222,9 @@ def _lines(path: Path, head: bytes, encoding: str, *, complete: bool) -> list[tu
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
     except (UnicodeDecodeError, LookupError) as error:
-        raise refusal(path, f"cannot be read: {error}; which encoding is it?", key="--encoding") from error
+        raise refusal(
+            path, f"cannot be read: {shortened(str(error))}; which encoding is it?", key="--encoding"
+        ) from error
     lines = text.removeprefix("\ufeff").splitlines()
     if not complete:
         lines = lines[:-1]
@@ -180,9 +239,9 @@ def _marks(path: Path, lines: list[str], options: TextOptions) -> tuple[str, str
     """Return the separator and the decimal mark that read most fields as numbers."""
     given = _WORDS.get(options.separator or "", options.separator)
     if given is not None and given not in _SEPARATORS:
-        raise refusal(path, f"expected one of , ; | tab blank, got {options.separator!r}", key="--separator")
+        raise refusal(path, f"expected one of , ; | tab blank, got {quoted(options.separator)}", key="--separator")
     if options.decimal not in {None, ".", ","}:
-        raise refusal(path, f"expected . or , got {options.decimal!r}", key="--decimal")
+        raise refusal(path, f"expected . or , got {quoted(options.decimal)}", key="--decimal")
     choices = []
     for rank, separator in enumerate(_SEPARATORS if given is None else [given]):
         for decimal in ".," if options.decimal is None else options.decimal:
@@ -214,14 +273,17 @@ def _share(lines: list[str], separator: str, decimal: str) -> tuple[float, int]:
     """Return the share of fields that are numbers or times, and the usual number of fields."""
     rows = [fields_of(line, separator) for line in lines]
     n_columns = Counter(map(len, rows)).most_common(1)[0][0]
-    cells = [cell for row in rows if len(row) == n_columns for cell in row]
+    # An empty field is a missing value, and says nothing.
+    cells = [cell for row in rows if len(row) == n_columns for cell in row if cell]
     good = sum(_is_value(cell, decimal) for cell in cells)
     # Rows of another length cannot be read, so they count as fields that are none.
-    return good / (len(cells) + n_columns * sum(len(row) != n_columns for row in rows)), n_columns
+    return good / max(len(cells) + n_columns * sum(len(row) != n_columns for row in rows), 1), n_columns
 
 
 def _is_value(cell: str, decimal: str) -> bool:
-    return bool((_POINT if decimal == "." else _COMMA).fullmatch(cell) or ISO.fullmatch(cell) or CLOCK.fullmatch(cell))
+    return bool(
+        (_POINT if decimal == "." else _COMMA).fullmatch(cell) or any(p.fullmatch(cell) for p in (ISO, CLOCK, _HEX))
+    )
 
 
 def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: str, options: TextOptions) -> None:
@@ -237,7 +299,8 @@ def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: 
         pairs = [row for row in rows if len(row) == len(rows[-1]) and len(row) % 2 == 0]
         fractions = {cell for row in pairs for cell in row[1::2] if re.fullmatch(r"0\d+", cell)}
         header = next((row for row in rows if not any(_is_value(cell, ".") for cell in row)), None)
-        if fractions or (header is not None and pairs and 2 * len(header) == len(pairs[-1])):
+        named = header is not None and len(header) == len(rows[-1])
+        if (fractions and not named) or (header is not None and pairs and 2 * len(header) == len(pairs[-1])):
             what = "may be columns with commas between, or numbers with a decimal comma"
             raise refusal(path, f"{lines[-1][:40]!r} {what}: give --decimal , or --separator ,", key="--decimal")
 
@@ -280,7 +343,16 @@ def _parts(
         preamble=_preamble([text for number, text in lines if number < (header_line or first)]),
         header_line=header_line,
         unit_line=unit_line[0] if unit_line else None,
+        ornaments=Ornaments(),
+        only=None,
+        hex_bits={i: _bits(tail, i) for i, kind in enumerate(kinds[:n_named]) if kind == "hex"},
     )
+
+
+def _bits(rows: list[list[str]], column: int) -> int:
+    """Return the size of a word of as many hexadecimal digits as the longest has."""
+    digits = max(len(row[column]) - 2 for row in rows if len(row) > column)
+    return 8 if digits <= 2 else 16 if digits <= 4 else 32
 
 
 def _kinds(rows: list[list[str]], decimal: str) -> list[str]:
@@ -295,6 +367,7 @@ def _kind(cells: list[str], decimal: str) -> str:
     tests = (
         ("integer", lambda cell: re.fullmatch(r"[+-]?\d{1,19}", cell)),
         ("number", number.fullmatch),
+        ("hex", _HEX.fullmatch),
         ("iso", ISO.fullmatch),
         ("clock", CLOCK.fullmatch),
     )
@@ -316,17 +389,27 @@ def _is_row(row: list[str], readable: list[int], decimal: str) -> bool:
 def _header(
     above: list[tuple[int, list[str]]], n_named: int, n_columns: int
 ) -> tuple[tuple[int, list[str]] | None, tuple[int, list[str]] | None]:
-    """Return the line of names and the line of units above the rows, each with its number, or None."""
-    near = []
+    """Return the line of names and the line of units above the rows, each with its number, or None.
+
+    The names are those above the units, else the nearest; where they leave columns without a name of their own, the
+    line above them says the rest.
+    """
+    near: list[tuple[int, list[str]]] = []
     for number, row in reversed(above):
         if len(row) not in {n_named, n_columns}:
             break
-        near.append((number, row))
+        near.append((number, row[:n_named]))
     if not near:
         return None, None
-    if len(near) >= 2 and all(_is_unit(cell) for cell in near[0][1]) and any(near[0][1]):
-        return near[1], near[0]
-    return near[0], None
+    at = next(
+        (k for k, (_, row) in enumerate(near[:2]) if k + 1 < len(near) and any(row) and all(map(_is_unit, row))), None
+    )
+    place = 0 if at is None else at + 1
+    number, names = near[place]
+    if place + 1 < len(near) and (len(set(names)) < len(names) or not all(names)):
+        above_them = near[place + 1][1]
+        names = [" ".join(filter(None, pair)) for pair in zip(above_them, names, strict=False)]
+    return (number, names), None if at is None else near[at]
 
 
 def _is_unit(cell: str) -> bool:

@@ -44,6 +44,8 @@ _STRANGERS = (
     (b"\x89PNG", "a picture"),
     (b"RIFF", "a RIFF file (sound): write its samples to a text or npy file"),
 )
+_JSON = re.compile(rb'\s*[\[{]\s*["{\[]')
+_JSON_LINE = re.compile(rb"\s*[\[{][^\[{\]}\n]*[\]}],?\r?\n")
 _MINISEED = re.compile(rb"(\d{6}[DRQM][ \0])|(MS\x03)")
 _UFF = re.compile(rb"\s{4}-1\s*\r?\n\s*\d+")
 # Formats that need a library of `testbed[logs]`: module below `readers`, and the library.
@@ -112,6 +114,10 @@ def format_of(path: Path, head: bytes) -> str:
     for mark, name in SIGNATURES:
         if head.startswith(mark):
             return name
+    if _JSON.match(head) and not _JSON_LINE.match(head):
+        raise refusal(
+            path, 'expected a recording, got JSON in one piece: write one sample a line, such as {"t": 0, "w": 1}'
+        )
     return "MiniSEED" if _MINISEED.match(head) else "UFF" if _UFF.match(head) else "text"
 
 

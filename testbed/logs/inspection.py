@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.clock import NANO, Tally, TimeBase
+from testbed.logs.clock import NANO, ClockScan, Tally, TimeBase
 from testbed.logs.plan import ROTATIONS
-from testbed.logs.reader import stamp_scans
+from testbed.logs.reader import is_sparse, stamp_scans
 from testbed.logs.values import Values, ValueScan, word_size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from testbed.logs.channel import LogChannel
+    from testbed.logs.keeping import Timed
     from testbed.logs.plan import Plan
-    from testbed.logs.table import Table
+    from testbed.logs.table import Block, Table
 
 _PLACES = 5
 _GYRO = re.compile(r"gyr|rate|omega|\bw\b|^[grw]_?[xyz]$", re.IGNORECASE)
@@ -31,7 +34,7 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``gaps``, ``doubled``, ``backward``, ``uneven``, ``coarse``, ``wraps``, ``missing``, ``repeats``,
+        ``gaps``, ``doubled``, ``backward``, ``uneven``, ``coarse``, ``wraps``, ``missing``, ``repeats``, ``stray``,
         ``saturation``, ``rounding``, ``unit`` or ``rate``.
     message : str
         What, where, and what may be done.
@@ -91,18 +94,41 @@ def inspect(plans: Sequence[Plan]) -> list[Report]:
 
 def _inspect_group(plans: Sequence[Plan]) -> Iterator[tuple[Plan, Report]]:
     table = plans[0].table
-    scans = [ValueScan() for _ in plans]
+    scans = [_ChannelScan(one) for one in plans]
     clocks = stamp_scans(plans)
     stamps = {one.stamps for one in plans if one.stamps is not None}
     for block in table.blocks(list(dict.fromkeys([*(one.value for one in plans), *stamps])), stamps):
-        for one, scan in zip(plans, scans, strict=True):
-            scan.add(np.asarray(block[one.value], np.float64))
-        for stamp in clocks.values():
-            stamp.add(block[stamp.column])
+        times = {key: stamp.add(block[stamp.column]) for key, stamp in clocks.items()}
+        for scan in scans:
+            scan.add(block, times)
     for one, scan in zip(plans, scans, strict=True):
         found = clocks.get((one.stamps, one.time_unit))
-        clock, values = None if found is None else found.result(), scan.result()
+        clock, values = scan.clock() or (None if found is None else found.result()), scan.values.result()
         yield one, Report(one, values, clock, tuple(channel_findings(table, clock, values, one)))
+
+
+class _ChannelScan:
+    """The values of a channel; of one that is slower than its rows, which the first block shows, its own stamps too."""
+
+    def __init__(self, one: Plan) -> None:
+        self._one, self.values = one, ValueScan()
+        self._clock: ClockScan | None = None
+        self._first = True
+
+    def add(self, block: Block, times: Mapping[Timed, NDArray[np.int64]]) -> None:
+        numbers = np.asarray(block[self._one.value], np.float64)
+        stamps = times.get((self._one.stamps, self._one.time_unit))
+        if self._first and stamps is not None and is_sparse(numbers):
+            self._clock = ClockScan()
+        self._first = False
+        if self._clock is not None and stamps is not None:
+            known = np.isfinite(numbers)
+            numbers = numbers[known]
+            self._clock.add(stamps[known])
+        self.values.add(numbers)
+
+    def clock(self) -> TimeBase | None:
+        return None if self._clock is None else self._clock.result()
 
 
 def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: Plan) -> Iterator[Finding]:
@@ -130,7 +156,9 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
     if not _turns(one):
         return
     if values.repeats > 1.0:
-        yield Finding("repeats", f"each value stands {values.repeats:.3g} times in {one.label}: the sensor is slower")
+        yield Finding("repeats", _repeats_text(values, one.label))
+    if values.stray is not None:
+        yield Finding("stray", _stray_text(values.stray, one.label))
     limit = None if one.largest is None else one.largest / abs(one.factor)
     if values.saturated or (limit is not None and max(-values.low, values.high) >= 0.999 * limit):
         ends = f"{values.at_low} samples at {values.low:g}, {values.at_high} at {values.high:g}"
@@ -141,6 +169,17 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
         yield Finding(
             "rounding", f"{one.label} is rounding: words of {values.word:.4g}, noise of less than half a word"
         )
+
+
+def _repeats_text(values: Values, label: str) -> str:
+    n = values.repeats
+    return f"each value stands {n:.3g} times in {label}: the sensor is slower; --average {n:.0f} takes each once"
+
+
+def _stray_text(stray: tuple[float, int], label: str) -> str:
+    value, count = stray
+    word = f"--missing {value:.12g} if that means none"
+    return f"{value:.12g} stands {count} times in {label}, far from all others: a fault, or a word ({word})"
 
 
 def _turns(one: Plan) -> bool:
@@ -211,6 +250,13 @@ def remarks(channel: LogChannel) -> list[str]:
         said.append(gap_text(channel.table, channel.clock))
     if channel.clock is not None and channel.clock.wraps:
         said.append(f"the counter of the stamps began anew {channel.clock.wraps} times, which was taken into account")
+    scan = ValueScan()
+    scan.add(channel.values)
+    values, factor = scan.result(), channel.factor
+    if values.repeats > 1.0:
+        said.append(_repeats_text(values, channel.label))
+    if values.stray is not None:
+        said.append(_stray_text((values.stray[0] / factor, values.stray[1]), channel.label))
     return said
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,8 +11,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 
 from testbed import units
 from testbed.document import Document
+from testbed.errors import quoted
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
+from testbed.logs.selection import TextOptions
 from testbed.parts import Part
 
 Kind = Literal["rate", "increment", "angle"]
@@ -79,7 +82,7 @@ class TimeMap(Part):
         try:
             return int(np.datetime64(self.epoch.removesuffix("Z"), "ns").astype(np.int64))
         except ValueError as error:
-            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {self.epoch!r}"
+            msg = f"expected an epoch in ISO 8601, such as '2024-05-01T12:00:00', got {quoted(self.epoch)}"
             raise ValueError(msg) from error
 
 
@@ -143,8 +146,8 @@ class LogMap(Part):
         The recording, or its consecutive parts; relative to the map.
     channels : dict
         Channels by their name.
-    separator, decimal, encoding, skip : optional
-        How a text file is written, where that can be read in two ways.
+    separator, decimal, encoding, skip, missing, only, drop_faulty : optional
+        How a text file is written, where that can be read in two ways, and which of its lines are rows.
     """
 
     file: Location | list[Location] | None = None
@@ -153,6 +156,14 @@ class LogMap(Part):
     decimal: str | None = None
     encoding: str | None = None
     skip: Annotated[int, Field(ge=0)] | None = None
+    missing: str | None = None
+    only: str | None = None
+    drop_faulty: bool = False
+
+    @property
+    def text(self) -> TextOptions:
+        """How a text file is written."""
+        return TextOptions(**{part.name: getattr(self, part.name) for part in fields(TextOptions)})
 
 
 def load_map(path: Path) -> LogMap:
@@ -196,7 +207,7 @@ def unit_quantity(unit: str) -> str:
     """
     found = quantity_of(unit)
     if not found:
-        msg = f"{unit!r} is no unit of a channel; expected one such as 'deg/s', 'arcsec' or 'degC'"
+        msg = f"{quoted(unit)} is no unit of a channel; expected one such as 'deg/s', 'arcsec' or 'degC'"
         raise ValueError(msg)
     return found
 
@@ -213,10 +224,10 @@ def measure(text: str) -> tuple[float, str]:
     try:
         value = float(number)
     except ValueError as error:
-        msg = f"expected a number and a unit, such as '0.07 deg/s', got {text!r}"
+        msg = f"expected a number and a unit, such as '0.07 deg/s', got {quoted(text)}"
         raise ValueError(msg) from error
     if not unit.strip():
-        msg = f"expected a number and a unit, such as '0.07 deg/s', got {text!r}: the unit is missing"
+        msg = f"expected a number and a unit, such as '0.07 deg/s', got {quoted(text)}: the unit is missing"
         raise ValueError(msg)
     kind = unit_quantity(unit.strip())
     return value * units.parse(f"1 {unit}", QUANTITIES[kind]), kind

@@ -20,11 +20,17 @@ QUANTITIES = {
     "frequency": "Hz",
 }
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]\s*$")
-_SUFFIX = re.compile(r"^(?P<name>.*[^_. ])[_. ](?P<unit>[^_ ]+|rad_s|deg_s|rad[ _]s-1|deg[ _]s-1)$")
+_SUFFIX = re.compile(r"^(?P<name>.*[^_. ])[_. ](?P<unit>[^_ ]+)$")
+_COMMA = re.compile(r"^(?P<name>.*?)\s*,\s*(?P<unit>[^,]+)$")
+# Units in the name of a column that are written without a stroke.
+_SPELLED = re.compile(
+    r"^(?P<name>.*[^_. ])[_. ](?P<prefix>m|u)?(?P<angle>rad|deg)(?:[ _]?(?:s-1|ps|s)|_?per_?s(?:ec)?|_sec)$",
+    re.IGNORECASE,
+)
 _TIME = re.compile(
     r"^(t|time|times|timestamp\w*|time ?stamp|stamp|stamps|zeit|zeitstempel|epoch|datetime|date|secs?|seconds?|"
     r"us|ms|ns|usec|msec|nsec|unix\w*|utc\w*|clock|tsample\w*|systime\w*|sampletime\w*|t_\w+|time_\w+|"
-    r"header\.stamp.*)$",
+    r"i?tow(_\w+)?|seconds_elapsed|elapsed\w*|(field\.)?header\.stamp.*)$",
     re.IGNORECASE,
 )
 _SECONDS = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "usec": "us", "msec": "ms", "nsec": "ns"}
@@ -77,8 +83,10 @@ def take_apart(name: str, unit: str = "") -> Label:
 
 
 def clean_unit(text: str) -> str:
-    """Return a unit without the brackets of a line of units, or the date that NetCDF counts from."""
+    """Return a unit without the brackets of a line of units, or the date that NetCDF counts from; none of a dash."""
     bare = re.sub(r"\s+since\s.*", "", text.strip())
+    if not bare.strip("-"):
+        return ""
     return bare[1:-1].strip() if bare[:1] + bare[-1:] in {"[]", "()"} else bare
 
 
@@ -104,16 +112,16 @@ def second(unit: str) -> str:
 def _unit_in(name: str) -> str:
     if name.lower() in _ALONE:
         return second(name)
-    for pattern in (_BRACKETS, _SUFFIX):
+    if match := _SPELLED.match(name):
+        return f"{(match['prefix'] or '').lower()}{match['angle'].lower()}/s"
+    for pattern in (_BRACKETS, _COMMA, _SUFFIX):
         match = pattern.match(name)
         if match is None:
             continue
         unit = match["unit"].strip()
-        if pattern is _SUFFIX:
-            unit = {"rad_s": "rad/s", "deg_s": "deg/s", "rads": "rad/s", "degs": "deg/s"}.get(unit, unit)
-            # One letter is an axis or a number more often than a unit; seconds are said by the name before.
-            if len(unit) == 1 and not (unit == "s" and _TIME.match(match["name"])):
-                continue
+        # One letter is an axis or a number more often than a unit; seconds are said by the name before.
+        if pattern is _SUFFIX and len(unit) == 1 and not (unit == "s" and _TIME.match(match["name"])):
+            continue
         if quantity_of(unit) or unit.lower() in _SECONDS:
             return second(unit)
     return ""
@@ -123,4 +131,5 @@ def _without_unit(name: str) -> str:
     match = _BRACKETS.match(name)
     if match and match["name"] and not match["unit"].strip().isdigit():
         return match["name"].strip()
-    return name
+    match = _COMMA.match(name)
+    return match["name"] if match and quantity_of(match["unit"]) else name

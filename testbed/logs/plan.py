@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed import units
+from testbed.errors import quoted
 from testbed.logs.clock import NANO
 from testbed.logs.logmap import ChannelMap, TimeMap, measure, time_factor
 from testbed.logs.names import QUANTITIES, Label, quantity_of, take_apart
@@ -70,6 +71,8 @@ class Plan:
         What was taken for granted.
     contradictions : tuple of str
         What the file says otherwise.
+    average : int
+        Samples of which the mean is kept [-].
     """
 
     name: str
@@ -90,6 +93,7 @@ class Plan:
     largest: float | None
     assumed: tuple[str, ...]
     contradictions: tuple[str, ...]
+    average: int = 1
 
 
 def option_keys(field: str) -> str:
@@ -118,7 +122,7 @@ def find_column(table: Table, text: str, key: str, topic: str | None = None) -> 
     ]
     if not inside:
         groups = sorted({column.group for column in table.columns})
-        raise refusal(table.path, f"no topic {topic!r}; there are {_few(groups)}", key)
+        raise refusal(table.path, f"no topic {quoted(topic)}; there are {_few(groups)}", key)
     tests: tuple[Callable[[int], bool], ...] = (
         lambda i: names[i] == text,
         lambda i: names[i].lstrip("#% ") == text.lstrip("#% "),
@@ -130,8 +134,8 @@ def find_column(table: Table, text: str, key: str, topic: str | None = None) -> 
         if len(found) == 1:
             return found[0]
         if found:
-            where = ", ".join(f"{names[i]!r} (column {i + 1})" for i in found[:8])
-            raise refusal(table.path, f"{text!r} is {len(found)} columns: {where}; give its number or topic", key)
+            where = ", ".join(f"{quoted(names[i])} (column {i + 1})" for i in found[:8])
+            raise refusal(table.path, f"{quoted(text)} is {len(found)} columns: {where}; give its number or topic", key)
     if re.fullmatch("[0-9]{1,9}", text) and 1 <= int(text) <= len(names):
         return int(text) - 1
     raise _unknown(table, text, key, names)
@@ -140,13 +144,15 @@ def find_column(table: Table, text: str, key: str, topic: str | None = None) -> 
 def _unknown(table: Table, text: str, key: str, names: Sequence[str]) -> ScenarioError:
     fifo = getattr(table, "rows_of", {}).get(text)
     if fifo:
-        return refusal(table.path, f"{text!r} is one of the samples that a row holds: take column {fifo!r}", key)
+        return refusal(
+            table.path, f"{quoted(text)} is one of the samples that a row holds: take column {quoted(fifo)}", key
+        )
     if table.columns and names[0] == "column 1":
-        message = f"no column {text!r}; there are {len(names)} and no header: give a number from 1 on"
+        message = f"no column {quoted(text)}; there are {len(names)} and no header: give a number from 1 on"
     else:
         near = difflib.get_close_matches(text, names, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        message = f"no column {text!r}; the header has {_few(names)}{hint}"
+        hint = f"; did you mean {quoted(near[0])}?" if near else ""
+        message = f"no column {quoted(text)}; the header has {_few(names)}{hint}"
     return refusal(table.path, message, key)
 
 
@@ -212,7 +218,9 @@ def plan(name: str, channel: ChannelMap, table: Table, keys: Keys = option_keys)
     unit, quantity, factor, zero, assumed = _measured(channel, table, place)
     if channel.kind and quantity and quantity != {"rate": "rate"}.get(channel.kind, "angle"):
         good = "deg/s" if channel.kind == "rate" else "arcsec"
-        raise refusal(table.path, f"kind {channel.kind} expects a unit such as {good}, got {unit!r}", keys("kind"))
+        raise refusal(
+            table.path, f"kind {channel.kind} expects a unit such as {good}, got {quoted(unit)}", keys("kind")
+        )
     stamps, time_unit, rate, said, time_notes = _timed(channel.time, table, place, keys)
     column = table.columns[place]
     largest = measure(channel.range)[0] if channel.range else None
@@ -296,7 +304,7 @@ def _timed(
         raise refusal(table.path, f"expected one column of time, got {names}: say which", keys("time.column"))
     if found and found[0] in unreadable(table):
         name = table.columns[found[0]].name
-        message = f"the times in {name!r} are no numbers and not ISO 8601: convert them, or give --rate"
+        message = f"the times in {quoted(name)} are no numbers and not ISO 8601: convert them, or give --rate"
         raise refusal(table.path, message, keys("time.column"))
     if found:
         unit, note = _time_unit(table, found[0], None, keys, guessed=True)
@@ -331,11 +339,11 @@ def _time_unit(table: Table, stamps: int, said: str | None, keys: Keys, *, guess
     if "tscale" in table.header:
         return float(table.header["tscale"]), [f"time in {table.header['tscale']} s, as the preamble says"]
     if epoch_unit:
-        return time_factor(epoch_unit), [f"time {label.name!r} in {epoch_unit}: only so it is a date"]
+        return time_factor(epoch_unit), [f"time {quoted(label.name)} in {epoch_unit}: only so it is a date"]
     if kind == "integer" and guessed:
-        message = f"expected the unit of the time {label.name!r}, such as us: its whole numbers may be anything"
+        message = f"expected the unit of the time {quoted(label.name)}, such as us: its whole numbers may be anything"
         raise refusal(table.path, message, keys("time.unit"))
-    return 1.0, [f"time {label.name!r} in s: no unit was given"]
+    return 1.0, [f"time {quoted(label.name)} in s: no unit was given"]
 
 
 def _looks(table: Table, stamps: int) -> tuple[str, str]:

@@ -121,7 +121,9 @@ def _text(table: Table | None) -> dict[str, Any]:
     if not isinstance(inner, TextTable):
         return {}
     dialect = inner.dialect
+    asked = {key: value for key, value in vars(inner.said).items() if value}
     return {
+        **asked,
         "separator": {"\t": "tab", " ": "blank"}.get(dialect.separator, dialect.separator),
         "decimal": dialect.decimal,
         "encoding": dialect.encoding,

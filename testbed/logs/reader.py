@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +11,16 @@ import numpy as np
 
 from testbed.errors import Problem, ScenarioError
 from testbed.logs.chain import FileChain
-from testbed.logs.channel import Log, LogChannel
+from testbed.logs.channel import Log, LogChannel, refuse_uneven
+from testbed.logs.clock import ClockScan
 from testbed.logs.formats import open_table
+from testbed.logs.keeping import kept_columns
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
 from testbed.logs.names import take_apart
 from testbed.logs.options import refusal
 from testbed.logs.plan import Plan, channels_of, plan
-from testbed.logs.selection import TextOptions
 from testbed.logs.stamps import StampScan
+from testbed.logs.table import RowsOf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,14 +28,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from testbed.logs.clock import TimeBase
+    from testbed.logs.keeping import Timed
     from testbed.logs.table import Table
-
-    Timed = tuple[int | None, float]
 
 
 def read_log(
     path: str | Path,
     map: LogMap | Mapping[str, Any] | str | Path | None = None,
+    average: int = 1,
 ) -> Log:
     r"""Read a recording of any format that the testbed knows.
 
@@ -44,6 +45,8 @@ def read_log(
         The file, or a map that names it.
     map : LogMap, mapping, str or Path, optional
         Which column is what, or the YAML file that says so; left out: what the names of the columns say.
+    average : int
+        Samples of which the mean is kept, so that a recording of any length fits into memory [-].
 
     Returns
     -------
@@ -65,8 +68,8 @@ def read_log(
     (2000.0, 0.017453)
     """
     if map is None and is_map(path):
-        return read_map(None, load_map(Path(path)))
-    return read_map(Path(path), as_map(map))
+        return read_map(None, load_map(Path(path)), average)
+    return read_map(Path(path), as_map(map), average)
 
 
 def is_map(path: str | Path) -> bool:
@@ -89,20 +92,19 @@ def as_map(given: LogMap | Mapping[str, Any] | str | Path | None) -> LogMap | No
     return given
 
 
-def read_map(path: Path | None, found: LogMap | None) -> Log:
-    """Read the channels of a map from a file, or from the map's own files."""
+def read_map(path: Path | None, found: LogMap | None, average: int = 1) -> Log:
+    """Read the channels of a map from a file, or from the map's own files; the means of so many samples."""
     if found is None:
         assert path is not None
         table = open_table(path)
         plans = [plan(table.columns[i].name, ChannelMap(column=str(i + 1)), table) for i in channels_of(table)]
-        return Log(path, read_plans(short_names(plans)))
-    plans = plans_of(path, found)
+        return Log(path, read_plans(averaged(short_names(plans), average)))
+    plans = averaged(plans_of(path, found), average)
     return Log(path or plans[0].table.path, read_plans(plans))
 
 
 def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
     """Return how the channels of a map are read."""
-    options = TextOptions(found.separator, found.decimal, found.encoding, found.skip)
     said = found.file if isinstance(found.file, list) else [found.file] if found.file else []
     files = tuple(said if path is None else [path])
     tables: dict[tuple[Path, ...], Table] = {}
@@ -112,7 +114,7 @@ def plans_of(path: Path | None, found: LogMap) -> list[Plan]:
         if not own:
             raise ScenarioError([Problem("expected the file of the recording", key=f"channels.{name}.file")])
         if own not in tables:
-            opened = [open_table(one, options) for one in own]
+            opened = [open_table(one, found.text) for one in own]
             tables[own] = opened[0] if len(opened) == 1 else FileChain(opened)
         plans.append(plan(name, channel, tables[own], lambda field, name=name: f"channels.{name}.{field}"))  # type: ignore[misc]
     return plans
@@ -124,6 +126,13 @@ def short_names(plans: list[Plan]) -> list[Plan]:
     return [
         replace(one, name=name if short.count(name) == 1 else one.name) for one, name in zip(plans, short, strict=True)
     ]
+
+
+def averaged(plans: Sequence[Plan], average: int) -> list[Plan]:
+    """Return plans that keep the means of so many samples; ScenarioError if it is none."""
+    if average < 1:
+        raise ScenarioError([Problem(f"expected a number of samples from 1 on, got {average}", key="--average")])
+    return [replace(one, average=average) for one in plans]
 
 
 def read_plans(plans: Sequence[Plan]) -> dict[str, LogChannel]:
@@ -144,15 +153,11 @@ def read_plans(plans: Sequence[Plan]) -> dict[str, LogChannel]:
 
 
 def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
-    table = plans[0].table
     scans = stamp_scans(plans)
-    columns, times = _columns(table, plans, scans)
-    uses = Counter(one.value for one in plans)
-    for one in plans:
-        # A channel scales its numbers in place.
-        values = columns[one.value].copy() if uses[one.value] > 1 else columns[one.value]
+    columns, times = kept_columns(plans[0].table, plans, scans)
+    for one, values in zip(plans, columns, strict=True):
         key = (one.stamps, one.time_unit)
-        yield one.name, _channel(one, values, (times[key], scans[key].result()) if key in times else None)
+        yield one.name, _channel(one, values, times.get(key), scans[key].result() if key in scans else None)
 
 
 def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
@@ -161,66 +166,59 @@ def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
     return {(i, unit): StampScan(plans[0].table, i, unit) for i, unit in keys if i is not None}
 
 
-def _columns(
-    table: Table, plans: Sequence[Plan], scans: Mapping[Timed, StampScan]
-) -> tuple[dict[int, NDArray[Any]], dict[Timed, NDArray[np.int64]]]:
-    """Return whole columns and stamps: blocks are joined one by one, so that no two copies of all stand in memory."""
-    stamps = {one.stamps for one in plans if one.stamps is not None}
-    values: dict[int, list[NDArray[Any]]] = {one.value: [] for one in plans}
-    times: dict[Timed, list[NDArray[np.int64]]] = {key: [] for key in scans}
-    n_time = 0
-    for block in table.blocks(list(dict.fromkeys([*values, *stamps])), stamps):
-        n_time += next(iter(block.values())).size
-        for i, parts in values.items():
-            parts.append(block[i])
-        for key, scan in scans.items():
-            times[key].append(scan.add(block[scan.column]))
-    if not n_time:
-        raise refusal(table.path, "expected at least 4 samples, got 0")
-    return {i: _joined(parts) for i, parts in values.items()}, {key: _joined(parts) for key, parts in times.items()}
-
-
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """Return blocks as one array, and let go of them."""
-    whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-    parts.clear()
-    return whole
-
-
-def _channel(one: Plan, values: NDArray[Any], timed: tuple[NDArray[np.int64], TimeBase] | None) -> LogChannel:
+def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, clock: TimeBase | None) -> LogChannel:
     table = one.table
     numbers = values.astype(np.float64) if values.dtype.kind != "f" or values.dtype.itemsize != 8 else values
     if np.isinf(numbers).any():
         row = int(np.argmax(np.isinf(numbers)))
         message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
-        raise refusal(table.path, message, line=table.line(row))
-    stamps, clock = timed if timed else (None, None)
+        raise refusal(table.path, message, line=table.line(row * one.average))
     notes = [*one.contradictions, *table.notes]
     if clock is not None and not one.time_said:
-        assert one.rate_hz is not None
         notes += _contradiction(one, clock)
         stamps, clock = None, None
     elif clock is not None and one.nominal_hz is not None and clock.even and not clock.agrees_with(one.nominal_hz):
         notes.append(
             f"contradiction: the file says {one.nominal_hz:g} Hz, its stamps {clock.said()}; the stamps are used"
         )
+    if stamps is not None and clock is not None and is_sparse(numbers):
+        table, numbers, stamps, clock = _own_rows(table, numbers, stamps, clock)
+        notes.append(f"{one.label} has a value in fewer than half of the rows: the others are left out")
+    if clock is not None and one.average > 1:
+        refuse_uneven(table, clock)
+        notes.append(f"means of {one.average} samples of {clock.rate_hz:.6g} Hz")
     rate_hz = one.rate_hz if one.rate_hz is not None else clock.rate_hz if clock is not None else float("nan")
-    si = _in_si(numbers, one)
     return LogChannel(
         name=one.name,
         label=one.label,
-        values=si,
+        values=_in_si(numbers, one),
         unit=one.unit,
         quantity=one.quantity,
         kind=one.kind,
         stamps_ns=None if stamps is None else stamps + one.offset_ns,
         clock=clock,
-        rate_hz=rate_hz,
+        rate_hz=rate_hz / one.average,
         assumed=one.assumed,
         notes=tuple(notes),
         table=table,
         largest=one.largest,
+        factor=one.factor,
     )
+
+
+def is_sparse(numbers: NDArray[np.float64]) -> bool:
+    """Return whether most values are missing, as those of a slow sensor are in the rows of a quick one."""
+    return 2 * int(np.count_nonzero(np.isnan(numbers))) > numbers.size
+
+
+def _own_rows(
+    table: Table, numbers: NDArray[np.float64], stamps: NDArray[np.int64], clock: TimeBase
+) -> tuple[Table, NDArray[np.float64], NDArray[np.int64], TimeBase]:
+    """Return a slow channel in the rows that it has a value in."""
+    rows = np.flatnonzero(np.isfinite(numbers))
+    scan = ClockScan(float(clock.quantum_ns))
+    scan.add(stamps[rows])
+    return RowsOf(table, rows), numbers[rows], stamps[rows], scan.result()
 
 
 def _in_si(numbers: NDArray[np.float64], one: Plan) -> NDArray[np.float64]:

@@ -27,6 +27,10 @@ class TextOptions:
         Lines to leave out before the header, or before the first row where there is none.
     missing : str, optional
         Word that stands for a missing value, beside an empty field, ``nan`` and the like.
+    only : str, optional
+        Word that a line must hold to be read, such as ``$GYR`` or ``IMU``.
+    drop_faulty : bool
+        Leave out lines that are not like the others, and say how many.
     """
 
     PANEL: ClassVar[str] = "Text file"
@@ -45,6 +49,13 @@ class TextOptions:
     missing: str | None = field(
         default=None, metadata=_words("--missing", "Word of a text that stands for a missing value.", "WORD")
     )
+    only: str | None = field(
+        default=None, metadata=_words("--only", "Read the lines of a text that hold this word, such as $GYR.", "WORD")
+    )
+    drop_faulty: bool = field(
+        default=False,
+        metadata=_words("--drop-faulty", "Leave out lines of a text that are not like the others; they are counted."),
+    )
 
 
 @dataclass(frozen=True)
@@ -59,8 +70,10 @@ class Selection:
         As in a map.
     rate, time, time_unit : str, optional
         Sample rate, in hertz or with its unit; column of the time, and its unit.
+    average : int, optional
+        Samples of which the mean is kept, so that a long recording fits into memory.
     map : Path, optional
-        The map, instead of all these but `column`, which then are its channels.
+        The map, instead of all these but `column`, which then are its channels, and `average`.
     """
 
     PANEL: ClassVar[str] = "Channel"
@@ -89,6 +102,10 @@ class Selection:
     )
     time_unit: str | None = field(
         default=None, metadata=_words("--time-unit", "Unit of the time; default that in the file, or s.")
+    )
+    average: int | None = field(
+        default=None,
+        metadata=_words("--average", "Keep the means of this many samples, so that a long recording fits into memory."),
     )
     map: Path | None = field(
         default=None, metadata=_words("--map", "Map of the recording, instead of these.", "LOG.yaml")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.logs.clock import NANO, ClockScan, TimeBase, nanoseconds, resolution_ns
 from testbed.logs.options import refusal
 
@@ -58,11 +59,11 @@ class StampScan:
         missing = np.isnat(values) if values.dtype.kind == "M" else ~np.isfinite(values)
         if missing.any():
             line = self._table.line(self._row + int(np.argmax(missing)))
-            raise refusal(self._table.path, f"expected a time in {name!r}, got none; remove the line", line=line)
+            raise refusal(self._table.path, f"expected a time in {quoted(name)}, got none; remove the line", line=line)
         try:
             return nanoseconds(values, self._unit)
         except OverflowError as error:
-            raise refusal(self._table.path, f"{error}; is the unit of {name!r} right?", "--time-unit") from error
+            raise refusal(self._table.path, f"{error}; is the unit of {quoted(name)} right?", "--time-unit") from error
 
 
 def _turn(values: NDArray[Any], unit_s: float) -> int:

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
     Block = dict[int, NDArray[Any]]
@@ -83,3 +84,28 @@ class Table(Protocol):
     def line(self, row: int) -> int | None:
         """Return the line of a row, counted from 0, where the format has lines."""
         ...
+
+
+class RowsOf:
+    """Some rows of a table, for messages about them.
+
+    Parameters
+    ----------
+    table : Table
+        The file.
+    rows : ndarray, shape (n_time,)
+        Which of its rows.
+    """
+
+    def __init__(self, table: Table, rows: NDArray[np.intp]) -> None:
+        self._table, self._rows = table, rows
+        self.path, self.format = table.path, table.format
+        self.columns, self.header, self.notes = table.columns, table.header, table.notes
+
+    def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
+        """Yield what the file holds, all rows."""
+        return self._table.blocks(wanted, stamps)
+
+    def line(self, row: int) -> int | None:
+        """Return the line of one of these rows."""
+        return self._table.line(int(self._rows[row]))

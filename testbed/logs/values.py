@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 # Rows of the outline beyond which pairs are joined, and samples that the word is looked for in.
 _ROWS, _SAMPLE = 8192, 200_000
+# Ranges of the middle 98 % by which a number must stand off to be a stray one: 90 standard deviations of noise.
+_FAR = 20.0
 # A word is one if all differences are whole multiples of it to this part, up to so many words.
 _WHOLE, _MOST_WORDS = 0.05, 1e9
 # Share of equal neighbours, and word in steps, from which on values count as repeated.
@@ -45,6 +47,8 @@ class Values:
         The most in a row that do.
     outline : ndarray, shape (n_column, 2)
         Lowest and highest number of each stretch.
+    usual : tuple of float
+        Between what the middle 98 % of the numbers stand.
     """
 
     n_time: int
@@ -62,6 +66,17 @@ class Values:
     row_low: int
     row_high: int
     outline: FloatArray
+    usual: tuple[float, float]
+
+    @property
+    def stray(self) -> tuple[float, int] | None:
+        """A value at an end that stands far from all others, and how often; None if there is none."""
+        low, high = self.usual
+        room = _FAR * (high - low)
+        for value, count in ((self.low, self.at_low), (self.high, self.at_high)):
+            if room > 0.0 and (value < low - room or value > high + room):
+                return value, count
+        return None
 
     @property
     def saturated(self) -> bool:
@@ -136,6 +151,7 @@ class ValueScan:
             row_low=self._ends[-1][1],
             row_high=self._ends[1][1],
             outline=self._outline,
+            usual=_middle(sample),
         )
 
     def _pairs(self, values: FloatArray) -> None:
@@ -168,6 +184,14 @@ class ValueScan:
                 count, row = count + int(here.sum()), max(row, int(np.diff(edges)[::2].max()))
             self._ends[side] = (count, row)
         self._low, self._high = low, high
+
+
+def _middle(values: FloatArray) -> tuple[float, float]:
+    """Return between what the middle 98 % of finite numbers stand; NaN for none."""
+    if not values.size:
+        return np.nan, np.nan
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(low), float(high)
 
 
 def word_size(values: FloatArray) -> float:

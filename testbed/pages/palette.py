@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import hashlib
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ FILTERS = ("#2f9e58", "#b565d8", "#e2553d", "#c2652a", "#d6588f")
 
 # What ships keeps its colour wherever it is shown; any other name has one of its own.
 NAMED = {
+    "commanded": COMMANDED,
+    "truth": TRUTH,
     "sensors/mhd_ars": SENSORS[0],
     "sensors/mems_gyro": SENSORS[1],
     "sensors/fog": SENSORS[2],
@@ -32,7 +35,9 @@ NAMED = {
     "fusion/allan_srkf": "#9a7398",
 }
 # Hues of names that do not ship, in turns from red on.
-_HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42)}
+_HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42), "columns": (0.0, 1.0)}
+# Axes of a recording: red, green and blue everywhere.
+_AXES = {"x": FILTERS[2], "y": FILTERS[0], "z": SENSORS[0]}
 # Relative luminance that stands out 3:1 on white and on the viewer's dark background.
 _LUMINANCE = 0.2
 
@@ -43,11 +48,15 @@ def color_of(key: str) -> str:
     Parameters
     ----------
     key : str
-        ``sensors/<name>`` or ``fusion/<name>``.
+        ``sensors/<name>``, ``fusion/<name>``, ``truth``, ``commanded``, or ``columns/<name>`` of a recording.
     """
     if key in NAMED:
         return NAMED[key]
-    low, high = _HUES[key.split("/", maxsplit=1)[0]]
+    group, name = key.split("/", maxsplit=1)
+    axis = re.search(r"(?:^|[^a-z]|[gwr])([xyz])(?:$|[^a-z])", name.lower())
+    if group == "columns" and axis:
+        return _AXES[axis[1]]
+    low, high = _HUES[group]
     digest = hashlib.sha256(key.encode()).digest()
     return _with_luminance((low + digest[0] / 256 * (high - low)) % 1.0, 0.35 + digest[1] / 256 * 0.45)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.pages.palette import series_colors
+from testbed.pages.svg import FORMATS, figure_bytes
 from testbed.pages.template import render
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from testbed.runs.metrics import RunMetrics
 
 REPORT = "report.html"
+FIGURES = "figures"
 
 
 def write_report(run_dir: Path) -> Path:
@@ -48,8 +50,38 @@ def write_report(run_dir: Path) -> Path:
     run_dir = Path(run_dir)
     run = RunRecord.open(run_dir)
     scenario = read_text(run_dir / "scenario.yaml", "the resolved scenario (YAML text)")
-    rewrite(run_dir, REPORT, _render(run.metrics, scenario, digest_run(run)))
+    rewrite(run_dir, REPORT, _render(run.metrics, scenario, digest_run(run)).encode())
     return run_dir / REPORT
+
+
+def save_figures(run_dir: Path) -> list[Path]:
+    """Write the figures of the report for papers and slides: ``figures/<name>.svg``, ``.pdf`` and ``.png``.
+
+    Each is written beside and renamed, and the folder's manifest follows it; equal runs give equal files.
+
+    Parameters
+    ----------
+    run_dir : Path
+        Run folder.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    ScenarioError
+        As for `write_report`.
+    """
+    run_dir = Path(run_dir)
+    written = []
+    for name, figure in run_figures(RunRecord.open(run_dir)).items():
+        for kind in FORMATS:
+            place = f"{FIGURES}/{name}.{kind}"
+            rewrite(run_dir, place, figure_bytes(figure, kind))
+            written.append(run_dir / place)
+    return written
 
 
 def run_figures(run: RunRecord) -> dict[str, Figure]:

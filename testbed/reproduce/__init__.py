@@ -7,6 +7,7 @@ import importlib
 import math
 from typing import TYPE_CHECKING
 
+from testbed._version import __version__
 from testbed.errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def run_paper(name: str, seeds: int | None, out: Path) -> Iterator[str]:
     seeds : int or None
         Seeds 1 to this, of which each result is the median [-]; None takes those of `SEEDS`.
     out : Path
-        Folder to write to; made if it does not exist.
+        Folder to write; an earlier one of the testbed's is replaced whole.
 
     Yields
     ------
@@ -48,18 +49,20 @@ def run_paper(name: str, seeds: int | None, out: Path) -> Iterator[str]:
     Raises
     ------
     ScenarioError
-        If there is no such paper, or the folder cannot be written.
+        If there is no such paper, or the folder cannot be written or holds something else.
+    RunError
+        If the disk is full.
     """
     if name not in PAPERS:
         known = f"there is: {', '.join(PAPERS)}"
         problem = f"{name}: unknown paper, {known}"
         raise ScenarioError(problem)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        problem = f"--out: expected a folder that can be written, got {out}: {error.strerror}"
-        raise ScenarioError(problem) from error
-    yield from importlib.import_module(PAPERS[name]).report(seeds or SEEDS[name], out)
+    from testbed.runs.folder import RunFolder, failing_as_run_error
+
+    seeds = seeds or SEEDS[name]
+    with RunFolder(out) as folder, failing_as_run_error(str(out)):
+        yield from importlib.import_module(PAPERS[name]).report(seeds, folder.path)
+        folder.finish({"paper": name, "seeds": seeds, "version": __version__})
 
 
 def paper_tables(name: str, folder: Path) -> dict[str, list[dict[str, float | str | None]]]:

@@ -324,7 +324,7 @@ def _claims(
 
 def _table(path: Path, columns: list[str], first: tuple[float, ...], values: FloatArray, title: str) -> Iterator[str]:
     _write(path, columns, first, values)
-    yield f"{title} ({path})"
+    yield f"{title} ({path.name})"
     yield "".join(f"{name:>20s}" for name in columns)
     for key, row in zip(first, values, strict=True):
         yield f"{key:20g}" + "".join(f"{value:20.6g}" for value in row)

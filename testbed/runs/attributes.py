@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from testbed.fusion.base import diagnostic_unit
+from testbed.runs.block import POINTING_SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 CONVENTIONS = "CF-1.12"
-_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s", "temperature": "K"}
+_UNITS = {"rate": "rad/s", "std": "rad/s", "angle": "rad", "time": "s", "temperature": "K"} | dict.fromkeys(
+    POINTING_SIGNALS, "rad"
+)
 # By group and name; {} is the sensor or filter. Of all these only the time has a CF standard name.
 _LONG_NAMES = {
     ("commanded", "rate"): "commanded rate of the table",
@@ -20,6 +23,10 @@ _LONG_NAMES = {
     ("sensors", "temperature"): "temperature read inside {}",
     ("fusion", "rate"): "rate estimated by {}",
     ("fusion", "std"): "standard deviation that {} claims for its rate",
+    ("pointing", "residual"): "pointing error with {} fed forward",
+    ("pointing", "knowledge"): "error of the angle that {} and the tracker know",
+    ("pointing", "tracker_only"): "pointing error by the tracker alone",
+    ("pointing", "mirror"): "deflection of the mirror with {} fed forward",
 }
 
 

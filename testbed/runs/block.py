@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from testbed.fusion.base import EstimateBlock
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.turntable import TruthBlock
+    from testbed.pointing.line_of_sight import PointingBlock
     from testbed.signals import FloatArray
+
+# Of a line of sight, what a run keeps.
+POINTING_SIGNALS = ("residual", "knowledge", "tracker_only", "mirror")
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class RunBlock:
     temperatures, drifts : mapping
         By sensor with a thermometer inside: its readings [K], as many as of the rate, and the true thermal bias
         [rad/s].
+    pointing : mapping
+        What is left of the line of sight, by filter that feeds a mirror forward.
     """
 
     start: int
@@ -44,6 +50,7 @@ class RunBlock:
     profiles: Mapping[str, tuple[FloatArray, FloatArray]]
     temperatures: Mapping[str, FloatArray] = field(default_factory=dict)
     drifts: Mapping[str, FloatArray] = field(default_factory=dict)
+    pointing: Mapping[str, PointingBlock] = field(default_factory=dict)
 
     @property
     def n_time(self) -> int:
@@ -80,6 +87,9 @@ def columns(block: RunBlock, rates: Mapping[str, float]) -> Iterator[tuple[str, 
         start = first_due(block.start, base, rates[name])
         for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
             yield f"fusion/{name}", signal, start, rates[name], values
+    for name, sight in block.pointing.items():
+        for signal in POINTING_SIGNALS:
+            yield f"pointing/{name}", signal, block.start, base, getattr(sight, signal)
 
 
 def first_due(start: int, base_rate_hz: float, sample_rate_hz: float) -> int:

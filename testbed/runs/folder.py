@@ -27,7 +27,8 @@ ESSENTIAL = ("scenario.yaml", "run.nc", "metrics.json")
 
 
 class RunFolder:
-    """A run folder in the making: it replaces an earlier one in one step, or leaves no trace.
+    """A folder of the testbed in the making (a run, an audit, a paper): it replaces an earlier one in one step, or
+    leaves no trace.
 
     Parameters
     ----------
@@ -97,12 +98,12 @@ def in_the_way(place: Path) -> str:
     if not os.path.lexists(place):
         return ""
     if not place.is_dir():
-        return "exists and is no run folder of the testbed"
+        return "exists and is no folder of the testbed"
     if place.is_mount():
         return "is a mounted file system, which cannot be replaced (a folder inside it can)"
     found = strangers(place)
     if found and read_manifest(place) is None:
-        return f"exists and is no run folder of the testbed (it has no {MANIFEST})"
+        return f"exists and is no folder of the testbed (it has no {MANIFEST})"
     shown = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
     return f"holds what its {MANIFEST} does not list, or not as it is now: {shown}" if found else ""
 

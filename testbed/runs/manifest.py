@@ -33,7 +33,7 @@ def write_manifest(folder: Path, about: Mapping[str, Any]) -> None:
     _write(folder, {**about, "files": files})
 
 
-def rewrite(folder: Path, name: str, text: str) -> None:
+def rewrite(folder: Path, name: str, content: bytes) -> None:
     """Replace a file of a run folder, and what its manifest says of it, if it has one.
 
     The manifest comes first and knows the earlier file too: it holds whenever the machine stops.
@@ -42,16 +42,19 @@ def rewrite(folder: Path, name: str, text: str) -> None:
     ----------
     folder : Path
         Run folder.
-    name, text : str
-        File and new content.
+    name : str
+        File, below the folder.
+    content : bytes
+        What it holds from then on.
     """
-    content, manifest = text.encode(), read_manifest(folder)
+    manifest = read_manifest(folder)
     if manifest is not None:
         entry = _entry(hashlib.sha256(content).hexdigest(), len(content))
         if (folder / name).is_file():
             entry["replaces"] = digest(folder / name)[0]
         manifest["files"][name] = entry
         _write(folder, manifest)
+    (folder / name).parent.mkdir(exist_ok=True)
     write_bytes(folder / name, content)
 
 

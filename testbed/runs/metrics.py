@@ -158,6 +158,44 @@ class Budget(Entry):
             return np.asarray(information**-0.5)
 
 
+class PointingBudget(Entry):
+    """Who makes the residual: shares of its variance [-], which add up to 1; inside the knowledge by sensor and term.
+    Rms of each part, of all, and of all with one of them halved [urad]; `quadrature_urad` is what it is not.
+    """
+
+    shares: dict[str, float]
+    knowledge: dict[str, float | dict[str, float]]
+    rms_urad: dict[str, float]
+    knowledge_rms_urad: dict[str, float]
+    total_urad: float
+    quadrature_urad: float
+    dominant: str
+    halved_urad: dict[str, float]
+
+
+class PointingMetrics(Entry):
+    """What is left of the line of sight behind one filter [urad]; errors over windows by the window's length [s]."""
+
+    residual_rms_urad: float | None = None
+    knowledge_rms_urad: float | None = None
+    tracker_only_rms_urad: float | None = None
+    ape_urad: float | None = None
+    peak_urad: float | None = None
+    rpe_urad: dict[str, float | None] = {}
+    mpe_urad: dict[str, float | None] = {}
+    pde_urad: dict[str, float | None] = {}
+    pre_urad: dict[str, float | None] = {}
+    delay_us: float | None = None
+    levels: list[dict[str, float | None]] = []
+    bands: list[dict[str, float | None]] = []
+    curves: dict[str, list[float | None]] = {}
+    budget: PointingBudget | None = None
+    saturated: dict[str, float] = {}
+    gains: dict[str, float] = {}
+    margins: dict[str, float | None] = {}
+    link: dict[str, float | None] | None = None
+
+
 class Expectation(Entry):
     """A bound of the scenario on a sensor or filter, the value that was reached and whether it was met."""
 
@@ -200,6 +238,7 @@ class RunMetrics(Entry):
     bounds_reason: str | None = None
     floor_density: FloorDensity | None = None
     budget: Budget | None = None
+    pointing: dict[str, PointingMetrics] = {}
     expectations: list[Expectation] = []
     versions: dict[str, Any] = {}
     setup: list[PartSetup] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -29,8 +29,8 @@ class RunRecord:
     """A finished run: signals in SI and metrics.
 
     `commanded` and `truth` are on the base clock, each sensor of `sensors` on its own, each filter of `fusion` on that
-    of its fastest sensor. `metrics` is what metrics.json holds; `folder` is where the run is stored, None if it is
-    in memory only.
+    of its fastest sensor; `pointing` has, by filter, what is left of the line of sight. `metrics` is what metrics.json
+    holds; `folder` is where the run is stored, None if it is in memory only.
     """
 
     commanded: Signals
@@ -39,6 +39,7 @@ class RunRecord:
     fusion: Mapping[str, Signals]
     metrics: RunMetrics
     folder: Path | None = None
+    pointing: Mapping[str, Signals] = field(default_factory=dict)
 
     @classmethod
     def of(cls, groups: Mapping[str, Signals], metrics: RunMetrics, folder: Path | None = None) -> Self:
@@ -49,7 +50,15 @@ class RunRecord:
                 group.removeprefix(prefix): signals for group, signals in groups.items() if group.startswith(prefix)
             }
 
-        return cls(groups["commanded"], groups["truth"], below("sensors/"), below("fusion/"), metrics, folder)
+        return cls(
+            groups["commanded"],
+            groups["truth"],
+            below("sensors/"),
+            below("fusion/"),
+            metrics,
+            folder,
+            below("pointing/"),
+        )
 
     @classmethod
     def open(cls, folder: str | Path) -> Self:
@@ -85,6 +94,7 @@ class RunRecord:
             "truth": self.truth,
             **{f"sensors/{name}": signals for name, signals in self.sensors.items()},
             **{f"fusion/{name}": signals for name, signals in self.fusion.items()},
+            **{f"pointing/{name}": signals for name, signals in self.pointing.items()},
         }
 
     def __repr__(self) -> str:

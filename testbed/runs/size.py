@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from testbed.errors import Problem, ScenarioError
 from testbed.runs.attributes import is_precise
 from testbed.runs.block import columns
@@ -15,27 +17,39 @@ if TYPE_CHECKING:
 
     from testbed.runs.block import RunBlock
 
-# What compression leaves, times and smooth truths shrinking more than noise. Recording, report and metrics are bounded.
-_KEPT, _OTHER_FILES = 0.6, 10 << 20
+# What compression leaves of a signal, those that stay at one value aside.
+_KEPT = 0.5
+# The recording: bytes of a sample with its time, two samples in each of 4000 bins.
+_SAMPLE, _BINNED = 16, 8000
+# Report, metrics, scenario, and what the headers of the other files take.
+_OTHER_FILES = 600_000
 _SPARE = 1.05
 
 
-def disk_bytes(block: RunBlock, rates: Mapping[str, float], n_time: int) -> int:
+def disk_bytes(block: RunBlock, rates: Mapping[str, float], n_time: int, detail: tuple[float, float]) -> int:
     """Return about how large the folder of a run will be [byte].
 
     Parameters
     ----------
     block : RunBlock
-        Any of its blocks: what signals there are.
+        Any of its blocks: what signals there are. One that stays at one value in it is taken to do so to the end.
     rates : mapping of str to float
         Of ``base`` and of every sensor and filter [Hz].
     n_time : int
         Base samples of the run.
+    detail : tuple of float
+        From when to when the recording holds every sample [s].
     """
-    per_sample = 0.0
-    for _, name, _, rate, _ in columns(block, rates):
-        per_sample += (8 if is_precise(name) else 4) * rate / rates["base"]
-    return round(_KEPT * per_sample * n_time) + _OTHER_FILES
+    stored = recorded = 0.0
+    for group, name, _, rate, values in columns(block, rates):
+        n = n_time * rate / rates["base"]
+        if not values.size or np.ptp(values) != 0.0:
+            stored += (8 if is_precise(name) else 4) * n
+        recorded += min(n, _BINNED)
+        if name == "rate":
+            lines = 2 if group.startswith("fusion/") else 1  # the error beside the estimate
+            recorded += lines * min(n, (detail[1] - detail[0]) * rate)
+    return round(_KEPT * stored + _SAMPLE * recorded) + _OTHER_FILES
 
 
 def require_space(place: Path, needed: int) -> None:

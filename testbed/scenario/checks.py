@@ -15,6 +15,7 @@ from testbed.models.turntable.servo import count_torque
 from testbed.models.turntable.turntable import Turntable, check_plant
 from testbed.scenario.model import METRICS
 from testbed.scenario.peaks import command_peaks
+from testbed.scenario.pointing import check_pointing, known_pointing_metrics
 from testbed.scenario.step_choice import excerpt, exposed, given_step
 from testbed.sensors import SENSORS
 from testbed.sensors.checked import try_sensor
@@ -36,6 +37,7 @@ def cross_check(scenario: Scenario, document: Document) -> None:
         return
     _check_times(scenario, document)
     _check_clocks(scenario, document)
+    check_pointing(scenario, document)
     _check_expectations(scenario, document)
     _check_plant(scenario, document)
     _check_foreign_sensors(scenario, document)
@@ -134,8 +136,10 @@ def _check_expectations(scenario: Scenario, document: Document) -> None:
             document.find(
                 ("expect", bound.subject), f"is no sensor or filter of this scenario (there are {', '.join(subjects)})"
             )
-        elif bound.metric not in METRICS:
-            document.find(("expect", bound.subject, bound.metric), f"is no metric (known: {', '.join(METRICS)})")
+            continue
+        known = (*METRICS, *known_pointing_metrics(scenario, bound.subject))
+        if bound.metric not in known:
+            document.find(("expect", bound.subject, bound.metric), f"is no metric (known: {', '.join(known)})")
 
 
 def _check_foreign_sensors(scenario: Scenario, document: Document) -> None:

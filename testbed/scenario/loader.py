@@ -14,18 +14,22 @@ from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable.parameters import TurntableParameters
 from testbed.parts import merge, preset
+from testbed.pointing.parameters import PointingParameters, window_key
 from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
 from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake, unresolved
 from testbed.scenario.model import Bound, Frame, Scenario
+from testbed.scenario.pointing import WINDOW_METRICS
 from testbed.sensors import SENSORS, with_preset
 from testbed.sensors.base import Sensor
+from testbed.units import parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from testbed.document import Key
     from testbed.fusion.belief import SensorBelief
 
 _BOUND = re.compile(r"\s*(<=|>=|<|>)\s*([-+0-9.eE]+)\s*")
@@ -148,7 +152,7 @@ class _Reader:
     def instruments(self) -> Scenario | None:
         """Return the scenario without what reading its results does not need."""
         sensors = mapping(self._doc, self._doc.data.get("sensors"), ("sensors",))
-        kept = {key: value for key, value in self._doc.data.items() if key not in {"fusion", "expect"}}
+        kept = {key: value for key, value in self._doc.data.items() if key not in {"fusion", "pointing", "expect"}}
         shipped = {
             name: entry
             for name, entry in sensors.items()
@@ -157,7 +161,7 @@ class _Reader:
         return self._joined({**kept, "sensors": shipped, "motion": [{"static": {}}]})
 
     def _joined(self, data: dict[str, Any]) -> Scenario | None:
-        parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "expect")}
+        parts = {key: data.pop(key, None) for key in ("turntable", "motion", "sensors", "fusion", "pointing", "expect")}
         for key in [key for key in data if key not in Frame.model_fields]:
             self._doc.find((key,), unknown_key(str(key), [*Frame.model_fields, *parts]))
             del data[key]
@@ -168,6 +172,7 @@ class _Reader:
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
         fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
+        pointing = self._pointing(parts["pointing"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:
             return None
@@ -185,6 +190,7 @@ class _Reader:
             self._presets,
             self._intake.plugins.used,
             self._intake.allow_outside,
+            pointing,
         )
 
     def _with_preset(
@@ -261,18 +267,37 @@ class _Reader:
                 sensors[name] = sensor
         return sensors, types
 
+    def _pointing(self, data: Any) -> PointingParameters | None:
+        if data is None:
+            return None
+        return self._intake.validate(PointingParameters, mapping(self._doc, data, ("pointing",)), ("pointing",))
+
     def _expect(self, data: Any) -> tuple[Bound, ...]:
-        bounds = []
+        bounds: list[Bound] = []
         for subject, metrics in mapping(self._doc, data, ("expect",)).items():
             for metric, text in mapping(self._doc, metrics, ("expect", subject)).items():
-                match = _BOUND.fullmatch(text) if isinstance(text, str) else None
-                try:
-                    bounds.append(Bound(str(subject), str(metric), *_relation(match)))
-                except ValueError:
-                    self._doc.find(
-                        ("expect", subject, metric), f"expected a bound such as '< 0.0143', got {quoted(text)}"
-                    )
+                key = ("expect", subject, metric)
+                if isinstance(text, dict) and metric in WINDOW_METRICS:
+                    self._window_bounds(bounds, str(subject), key, text)
+                else:
+                    self._bound(bounds, str(subject), str(metric), key, text)
         return tuple(bounds)
+
+    def _window_bounds(self, bounds: list[Bound], subject: str, key: Key, entry: dict[Any, Any]) -> None:
+        for length, text in entry.items():
+            try:
+                metric = f"{key[-1]}.{window_key(parse(str(length), 's', example='100 ms'))}"
+            except ValueError as error:
+                self._doc.find((*key, length), str(error))
+                continue
+            self._bound(bounds, subject, metric, (*key, length), text)
+
+    def _bound(self, bounds: list[Bound], subject: str, metric: str, key: Key, text: Any) -> None:
+        match = _BOUND.fullmatch(text) if isinstance(text, str) else None
+        try:
+            bounds.append(Bound(subject, metric, *_relation(match)))
+        except ValueError:
+            self._doc.find(key, f"expected a bound such as '< 0.0143', got {quoted(text)}")
 
 
 def at_temperature(sensor: Sensor, temperature: float) -> Sensor:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.models.turntable.floor import FloorMotion
     from testbed.models.turntable.parameters import TurntableParameters
+    from testbed.pointing.parameters import PointingParameters
     from testbed.sensors.base import Sensor
 
 # Base samples of the default detail, at the least.
@@ -176,6 +177,7 @@ class Scenario:
     presets: Mapping[str, Any] = field(repr=False)
     plugins: tuple[Plugin, ...] = ()
     allow_outside: bool = False
+    pointing: PointingParameters | None = None
 
     @property
     def truth_seed(self) -> int:
@@ -324,6 +326,7 @@ class Scenario:
                 name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
                 for name, spec in self.fusion.items()
             },
+            **({} if self.pointing is None else {"pointing": dump(self.pointing)}),
             "expect": _expectations(self.expect),
         }
 

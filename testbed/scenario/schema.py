@@ -8,6 +8,7 @@ from testbed.fusion import FILTERS
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable import TurntableParameters
 from testbed.parts import preset_names, resolve
+from testbed.pointing.parameters import PointingParameters
 from testbed.scenario.model import Frame
 from testbed.sensors import SENSORS
 
@@ -15,6 +16,8 @@ _BELIEF = (
     "What the filter believes of the sensors: the name of a shipped belief, 'exact' for the simulator's own response "
     "and noise, or a mapping; by default what the data sheets of the sensors' presets support"
 )
+
+_BOUND = {"type": "string", "pattern": r"^\s*(<=|>=|<|>)\s*[-+0-9.eE]+\s*$"}
 
 
 def schema() -> dict[str, Any]:
@@ -49,11 +52,12 @@ def schema() -> dict[str, Any]:
             "additionalProperties": {"type": "object"},
             "properties": {name: _filter(name, part) for name in FILTERS},
         },
+        "pointing": part(PointingParameters),
         "expect": {
             "type": "object",
             "additionalProperties": {
                 "type": "object",
-                "additionalProperties": {"type": "string", "pattern": r"^\s*(<=|>=|<|>)\s*[-+0-9.eE]+\s*$"},
+                "additionalProperties": {"anyOf": [_BOUND, {"type": "object", "additionalProperties": _BOUND}]},
             },
         },
     }

@@ -241,7 +241,7 @@ def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
         },
         "written": "runs/paper2",
     }
-    assert spoken("reproduce", "paper2")[1:] == ("1 seed\n", "")
+    assert spoken("reproduce", "paper2")[1:] == ("1 seed\nwrote runs/paper2\n", "")
     assert spoken("reproduce", "paper2", "--quiet")[1:] == ("", "")
 
 

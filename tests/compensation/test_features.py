@@ -78,6 +78,22 @@ def test_steps_of_the_thermometer_stay_below_the_stated_slope_error(rate):
         assert ALL.compute(single, 1.0)[:, column].max() == pytest.approx(ALL.slope_error, rel=0.01)
 
 
+def test_the_slope_of_a_ramp_is_its_rate_where_readings_are_rare():
+    """One reading in ten smoothing times: 250 K rounded to 3e-14 K, against a lag of 1e-5 K, leaves eight digits."""
+    period, ramp = 10.0 * ALL.smoothing, 1e-4
+    slopes = ALL.compute(250.0 + ramp * period * np.arange(5), 1.0 / period)[:, ALL.names.index("dT/dt")]
+    assert slopes[-1] == pytest.approx(ramp, rel=1e-6)
+
+
+@pytest.mark.parametrize("times", [15.0, 50.0, 1e6])
+def test_readings_too_rare_for_a_slope_are_refused(times):
+    """Farther apart the lag is the rounding of the readings, then nothing: a division by zero once."""
+    rate = 1.0 / (times * ALL.smoothing)
+    with pytest.raises(ValueError, match="expected several readings within the 276 s"):
+        ALL.start(rate)
+    assert Features(slopes=False).compute(np.array([300.0, 301.0]), rate).shape == (2, 6)
+
+
 @pytest.mark.property
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(0, 400), max_size=6), st.integers(0, 2**31))

@@ -78,6 +78,17 @@ def test_an_empty_block_changes_nothing(name: str, readings: dict[str, FloatArra
     assert same(stage.process(readings), built(name).process(readings))
 
 
+def test_a_blank_block_has_what_a_filled_one_has(name: str, readings: dict[str, FloatArray]) -> None:
+    """What is foretold of a run, such as its size, is foretold without compiling the filter."""
+    stage = built(name)
+    blank, filled = stage.blank(N_TIME), stage.process(readings)
+    assert list(blank.diagnostics) == list(filled.diagnostics)
+    assert all(values.shape == (N_TIME,) for values in (blank.rate, blank.std, *blank.diagnostics.values()))
+    assert np.isnan(blank.rate).all()
+    assert 0.0 < stage.step_seconds < 1e-3
+    assert same(built(name).process(readings), filled)
+
+
 def test_missing_readings_mean_predict_only(name: str, readings: dict[str, FloatArray]) -> None:
     """What is claimed grows with every step, at least to 1 deg/s, never shrinks, and shrinks with readings."""
     stage = built(name)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from testbed.fusion import estimate
-from tests.contract.records import DEG, METHODS, NAMES, RATES, from_rest, named, readings_of, sines
+from tests.contract.records import DEG, NAMES, RATES, from_rest, named, readings_of, sines
 
 FULL_SCALE = {"mhd_ars": 10.0 * DEG, "mems_gyro": 500.0 * DEG}
 LENGTH, BEGIN, END = 1.5, 0.30, 0.31  # of the record and the fault [s]
@@ -17,6 +17,8 @@ AMPLITUDE = 1.0 * DEG
 # A false reading J of the AC-coupled sensor over D seconds looks like a change of J w D in the rate, w its slow pole.
 # Half as much again is for the filter's own time to settle.
 SHARE = 1.5 * (END - BEGIN) * MHD_CORNER
+# A tenth more than the error of a run without the bad reading: its own noise, through another path, is not less.
+FORGOTTEN = 1.1
 
 pytestmark = pytest.mark.contract
 
@@ -115,8 +117,7 @@ def test_what_a_lasting_fault_leaves_is_bounded(name, fault, sensor):
     block, injected = estimate_with(fault, name, sensor)
     check_sane(block)
     trace = np.abs(block.rate - fault_free(name).rate)[-10_000:].max()
-    share = 1.0 if METHODS[name].blames_the_other else SHARE
-    assert trace <= share * max(injected, AMPLITUDE)
+    assert trace <= SHARE * max(injected, AMPLITUDE)
 
 
 @pytest.mark.parametrize("sensor", RATES)
@@ -131,26 +132,7 @@ def test_a_single_bad_reading_is_forgotten(name, fault, sensor):
     rate, clean = readings()[0], fault_free(name)
     after = slice(round((BEGIN + 10.0 / MHD_CORNER) * 20_000), None)
     error, usual = (np.sqrt(np.mean((one.rate - rate)[after] ** 2)) for one in (block, clean))
-    assert error <= METHODS[name].spike_leaves * usual
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].blames_the_other])
-def test_who_blames_the_other_sensor_does(name):
-    """An exemption that is no longer needed has to go."""
-    block, injected = estimate_with(railed, name, "mhd_ars")
-    assert np.abs(block.rate - fault_free(name).rate)[-10_000:].max() > SHARE * injected
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].spike_leaves > 1.1])
-def test_who_remembers_a_spike_does(name):
-    after = slice(round((BEGIN + 10.0 / MHD_CORNER) * 20_000), None)
-    rate, errors = readings()[0], []
-    for fault in SINGLE:
-        for sensor in RATES:
-            block, _ = estimate_with(fault, name, sensor)
-            errors.append(np.sqrt(np.mean((block.rate - rate)[after] ** 2)))
-    usual = np.sqrt(np.mean((fault_free(name).rate - rate)[after] ** 2))
-    assert max(errors) > 1.1 * usual
+    assert error <= FORGOTTEN * usual
 
 
 @pytest.mark.slow

@@ -136,12 +136,11 @@ def test_each_command_says_its_result_to_a_program(cycles, model, tmp_path):
 
 def test_the_audit_of_a_frozen_model_passes_and_reduces_the_drift(cycles, model, tmp_path):
     """Median targets of one command: the drift is at least six times smaller after two cycles, every rate intact."""
-    result = CliRunner().invoke(
-        app, ["compensate", "audit", str(model), str(cycles / "unseen"), "--out", str(tmp_path)]
-    )
+    place = tmp_path / "audit"
+    result = CliRunner().invoke(app, ["compensate", "audit", str(model), str(cycles / "unseen"), "--out", str(place)])
     assert result.exit_code == 0, result.output
     assert "verdict: no leak found" in result.output
-    found = json.loads((tmp_path / "audit.json").read_text())
+    found = json.loads((place / "audit.json").read_text())
     assert found["passed"]
     assert found["leaks"] == []
     assert found["drift_reduction"] > 6.0
@@ -152,11 +151,11 @@ def test_the_audit_of_a_frozen_model_passes_and_reduces_the_drift(cycles, model,
     for letter, bound in (("N", 0.02), ("B", 0.06)):
         before, after = (found[key]["coefficients"][letter]["value"] for key in ("before", "after"))
         assert after == pytest.approx(before, rel=bound, abs=0.0)
-    gains = np.genfromtxt(tmp_path / "gains.csv", delimiter=",", names=True)
+    gains = np.genfromtxt(place / "gains.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(gains["period_s"], [line["period_s"] for line in found["gains"]])
-    names = {line.split(",")[0] for line in (tmp_path / "allan.csv").read_text().splitlines()[1:]}
+    names = {line.split(",")[0] for line in (place / "allan.csv").read_text().splitlines()[1:]}
     assert names == {"record", "compensated", "oracle"}
-    page = (tmp_path / "audit.html").read_text()
+    page = (place / "audit.html").read_text()
     assert page.count("<svg") == 3
     assert "No leak was found" in page
 
@@ -172,15 +171,15 @@ def test_the_audit_of_a_text_file_needs_no_truth(table, model, tmp_path):
         "--time-unit",
         "h",
         "--out",
-        str(tmp_path),
+        str(tmp_path / "audit"),
     ]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
-    found = json.loads((tmp_path / "audit.json").read_text())
+    found = json.loads((tmp_path / "audit" / "audit.json").read_text())
     assert found["oracle"] is None
     assert found["drift_reduction"] is None
     assert found["oracle_ratio_1h"] is None
-    assert "true drift" not in (tmp_path / "audit.html").read_text().split("<h2>Figures</h2>")[1]
+    assert "true drift" not in (tmp_path / "audit" / "audit.html").read_text().split("<h2>Figures</h2>")[1]
 
 
 def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
@@ -192,11 +191,11 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
             self.rate = record.rate - smoothed(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
 
     monkeypatch.setattr("testbed.drift.session.paper3.compensate", Result)
-    status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path], monkeypatch, capsys)
+    status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path / "audit"], monkeypatch, capsys)
     assert status == 1
     assert "LEAK: of a true rate with a period of 21600 s only" in text
     assert "LEAK: the Allan deviation at 1 h is" in text
-    assert "This result is a leak" in (tmp_path / "audit.html").read_text()
+    assert "This result is a leak" in (tmp_path / "audit" / "audit.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -279,9 +278,16 @@ def test_a_run_without_a_thermometer_is_refused(tmp_path):
         read_thermal(tmp_path / "run", Columns())
 
 
-@pytest.mark.parametrize(("command", "what"), [("train", "a file"), ("apply", "a file"), ("audit", "a folder")])
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        ("train", "--out: expected a file to write"),
+        ("apply", "--out: expected a file to write"),
+        ("audit", "exists and is no folder of the testbed"),
+    ],
+)
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(
-    cycles, model, tmp_path, monkeypatch, capsys, command, what
+    cycles, model, tmp_path, monkeypatch, capsys, command, why
 ):
     """A folder where a file is asked for, and the other way round; the words of the work do not appear."""
     taken = tmp_path / "taken"
@@ -289,7 +295,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     sources = [cycles / "up"] if command == "train" else [model, cycles / "unseen"]
     status, text = ends_with([command, *sources, "--out", taken], monkeypatch, capsys)
     assert status == 2
-    assert f"--out: expected {what} to write" in text
+    assert why in text
     assert "fog, 23.67 h" not in text
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from queue import Empty
 
-from tests.fuzz.cases import case
+from tests.fuzz.cases import BASES, KINDS, case
 from tests.fuzz.play import MOST_MEMORY, MOST_SECONDS, Result, memory, play
 
 # A worker that says nothing for so long hangs where no signal reaches it [s].
@@ -23,12 +23,14 @@ def work(jobs, results, folder):
     """Play cases until there are no more; the memory of the imports does not count."""
     os.environ.pop("TESTBED_PLUGINS", None)
     path = Path(folder) / f"case_{os.getpid()}.yaml"
-    play(case("tree", 0), path, 120.0)
-    play(case("text", 1), path, 120.0)
+    for base in BASES:
+        play("tree", base, path, 120.0)
+    for kind in KINDS:
+        play(kind, case(kind, 0), path, 120.0)
     base = memory()
     for kind, seed in iter(jobs.get, None):
         results.put((os.getpid(), kind, seed, None, 0))
-        results.put((os.getpid(), kind, seed, play(case(kind, seed), path), memory() - base))
+        results.put((os.getpid(), kind, seed, play(kind, case(kind, seed), path), memory() - base))
 
 
 class Table:

@@ -1,4 +1,4 @@
-"""Hostile inputs, each a function of its seed: scenario texts, mutated scenarios, hostile YAML."""
+"""Hostile inputs, each a function of its seed: scenario texts, mutated scenarios, hostile YAML, drift models, maps."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import re
 from pathlib import Path
 
 from ruamel.yaml import YAML
+
+from tests.fuzz.models import drift_model
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").rglob("*.yaml"))
 
@@ -78,6 +80,19 @@ sensors:
   fog: {preset: fog_paper3}
 """
 BASES = (PARTS, TWO_PATHS, FIXED)
+# A recording, and the map that reads it.
+LOG = "t [us],w [deg/s],gy,angle\n" + "".join(f"{500 * k},{k % 7},{k % 5},{k}\n" for k in range(200))
+MAP = """\
+file: log.csv
+separator: ","
+decimal: "."
+encoding: utf-8
+skip: 0
+channels:
+  mhd_ars: {column: "w [deg/s]", unit: deg/s, sign: -1, range: 10 deg/s, time: {column: "t [us]", unit: us}}
+  mems_gyro: {column: gy, scale: 0.07 deg/s, kind: rate, axis: z, time: {rate: 2000 Hz, offset: 1 ms}}
+  reference: {column: 4, unit: arcsec, kind: angle, time: {column: 1, unit: us, epoch: 2024-05-01T12:00:00}}
+"""
 
 NUMBERS = (
     *("0", "-0", "-1", "1", "1e-300", "1e300", "5e-324", "1.7e308", "1e-12", "1e9", "1e12", "1e-6", "1e6", "nan"),
@@ -94,7 +109,24 @@ SCALARS = (
 )
 KEYS = (
     *("name", "seed", "duration", "motion", "sensors", "fusion", "turntable", "expect", "type", "preset", "belief"),
-    *("mode", "file", "plugins", "__class__", "model_fields", "x", "", "1", "x" * 300, "a.b", "ä"),
+    *(
+        "mode",
+        "file",
+        "plugins",
+        "column",
+        "unit",
+        "time",
+        "epoch",
+        "rate",
+        "__class__",
+        "model_fields",
+        "x",
+        "",
+        "1",
+        "x" * 300,
+        "a.b",
+        "ä",
+    ),
 )
 TOKENS = (
     *("{", "}", "[", "]", ":", ": ", "- ", "&a ", "*a", "<<: *a", "!!python/object:os.system ", "!x ", "|", ">"),
@@ -226,7 +258,15 @@ def hostile_yaml(rng):
     return f"name: a\nduration: 1 s\n{rng.choice(KEYS)}: {nested(rng)}\n"
 
 
-KINDS = {"text": scenario_text, "tree": scenario_tree, "yaml": hostile_yaml}
+def log_map(rng):
+    """Return the text of a map that was changed in its tree or in its characters."""
+    if rng.random() < 0.7:
+        return mutated(rng, MAP)
+    i = rng.randrange(len(MAP))
+    return MAP[:i] + rng.choice((*TOKENS, *NUMBERS, *UNITS)) + MAP[i + rng.choice((0, 1, 10)) :]
+
+
+KINDS = {"text": scenario_text, "tree": scenario_tree, "yaml": hostile_yaml, "model": drift_model, "map": log_map}
 
 
 def case(kind, seed):

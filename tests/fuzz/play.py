@@ -1,4 +1,4 @@
-"""Plays a case as `testbed check` would, and says what is wrong with the answer."""
+"""Plays a case as its command would (`check`, `compensate`, `allan --map`), and says what is wrong with the answer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ import warnings as python_warnings
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 
-from testbed.errors import MOST_QUOTED, ScenarioError
+import numpy as np
+
+from testbed.errors import MOST_QUOTED, RunError, ScenarioError
+from tests.fuzz.cases import LOG
+from tests.fuzz.models import MOST_DRIFT, TRIED
 
 MOST_SECONDS, MOST_MEMORY = 5.0, 1 << 30
 # Long enough to be no list of known names.
@@ -40,37 +44,82 @@ class TookTooLongError(BaseException):
 
 @contextmanager
 def within(seconds):
+    """Give up after so much time of this process, or six times as much on the clock: others have the machine too."""
+
     def ring(_signal, _frame):
         raise TookTooLongError
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    timers = {signal.SIGPROF: (signal.ITIMER_PROF, seconds), signal.SIGALRM: (signal.ITIMER_REAL, 6 * seconds)}
+    before = {number: signal.signal(number, ring) for number in timers}
+    for timer, length in timers.values():
+        signal.setitimer(timer, length)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for number, (timer, _) in timers.items():
+            signal.setitimer(timer, 0)
+            signal.signal(number, before[number])
 
 
 def check(path):
-    """Do what `testbed check` does before it tries a first block, which may have to compile a kernel of a new size."""
-    from testbed.cli.check_page import warnings
+    """Do what `testbed check` does, both forms of its page and the document."""
+    from testbed.chain.forecast import forecast
+    from testbed.cli.check_page import print_page, size_document, warnings
     from testbed.cli.understood import print_scenario, scenario_document
     from testbed.judging.table_facts import table_facts
+    from testbed.scenario.departures import departures
     from testbed.scenario.loader import load_scenario
 
     scenario = load_scenario(path)
     warnings(scenario)
-    facts = table_facts(scenario)
-    json.dumps(scenario_document(scenario, facts), allow_nan=False)
+    try:
+        size = forecast(scenario)
+    except RunError as error:
+        raise ScenarioError(str(error)) from error
+    facts = table_facts(scenario, size.step)
+    document = {**scenario_document(scenario, facts), "differs": departures(scenario), "forecast": size_document(size)}
+    json.dumps(document, allow_nan=False)
     print_scenario(scenario, facts)
+    print_page(scenario, facts, size)
 
 
-def play(text, path, seconds=4 * MOST_SECONDS):
-    """Write a case and check it.
+def read(path):
+    """Read a drift model, and compensate a record with it."""
+    from testbed.drift.session import read_model
+
+    try:
+        block = read_model(path).apply(TRIED)
+    except ScenarioError:
+        raise
+    except ValueError as error:  # the commands show it as their own
+        raise ScenarioError(str(error)) from error
+    if not np.isfinite(block.rate).all() or not np.abs(block.drift).max() <= MOST_DRIFT:
+        msg = f"an absurd drift of {np.abs(block.drift).max()} rad/s"
+        raise AssertionError(msg)
+
+
+def inspect(path):
+    """Read the recording beside a map with it, and put what is a rate on an even grid."""
+    from testbed.logs import read_log
+
+    recording = path.parent / "log.csv"
+    if not recording.exists():
+        recording.write_text(LOG)
+    for channel in read_log(recording, map=path).channels.values():
+        if channel.quantity == "rate":
+            channel.rate().even()
+
+
+PLAYED = {"text": check, "tree": check, "yaml": check, "model": read, "map": inspect}
+
+
+def play(kind, text, path, seconds=4 * MOST_SECONDS):
+    """Write a case and do with it what users do.
 
     Parameters
     ----------
+    kind : str
+        What it is: see `PLAYED`.
     text : str
         The case.
     path : Path
@@ -89,14 +138,13 @@ def play(text, path, seconds=4 * MOST_SECONDS):
             python_warnings.catch_warnings(),
         ):
             python_warnings.simplefilter("ignore")
-            check(path)
+            PLAYED[kind](path)
     except ScenarioError as error:
         outcome, fault = "refused", message_fault(error)
     except TookTooLongError:
         outcome, fault = "hung", "".join(traceback.format_exc().splitlines(keepends=True)[-8:])
     except BaseException:  # noqa: BLE001 - whatever else comes out is what is looked for
         outcome, fault = "raised", traceback.format_exc()
-    # Of this process: others may have the machine too.
     spent = min(time.process_time() - cpu, time.monotonic() - begin)
     if not fault and spent > MOST_SECONDS:
         fault = f"took {spent:.1f} s"

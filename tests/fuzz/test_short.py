@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.fuzz.cases import BASES, KINDS, case
+from tests.fuzz.cases import BASES, KINDS, MAP, case
 from tests.fuzz.play import play
 
 
@@ -12,13 +12,17 @@ from tests.fuzz.play import play
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_case_raises_hangs_or_swells(tmp_path, kind):
     for seed in range(150):
-        result = play(case(kind, seed), tmp_path / "case.yaml")
+        result = play(kind, case(kind, seed), tmp_path / "case.yaml")
         assert not result.fault, f"{kind} {seed}: {result.fault}"
 
 
 @pytest.mark.parametrize("base", range(len(BASES)))
 def test_what_is_mutated_is_valid(tmp_path, base):
-    assert play(BASES[base], tmp_path / "case.yaml").outcome == "accepted"
+    assert play("tree", BASES[base], tmp_path / "case.yaml").outcome == "accepted"
+
+
+def test_the_map_that_is_mutated_reads_its_recording(tmp_path):
+    assert play("map", MAP, tmp_path / "case.yaml").outcome == "accepted"
 
 
 def test_a_planted_fault_is_seen(tmp_path, monkeypatch):
@@ -37,7 +41,7 @@ def test_a_planted_fault_is_seen(tmp_path, monkeypatch):
             pass
 
     for planted, outcome in ((raises, "raised"), (echoes, "refused"), (sleeps, "hung")):
-        monkeypatch.setattr(module, "check", planted)
-        result = play("name: a", tmp_path / "case.yaml", seconds=0.2)
+        monkeypatch.setitem(module.PLAYED, "text", planted)
+        result = play("text", "name: a", tmp_path / "case.yaml", seconds=0.2)
         assert result.outcome == outcome
         assert result.fault

@@ -13,7 +13,7 @@ import pytest
 import testbed
 from testbed.errors import RunError, ScenarioError
 from testbed.judging.allan_analysis import TERMS, allan_figure, analyse, write_figure
-from testbed.judging.allan_records import Record, read_run
+from testbed.judging.allan_records import RateRecord, read_run
 from testbed.sensors.noise import GyroNoise
 from tests.cli.test_app import assert_clear, call
 from tests.scenes import short_file
@@ -24,7 +24,7 @@ B = np.deg2rad(2.7) / 3600.0
 
 
 def record(n=50_000, fs=100.0, seed=1, **terms):
-    return Record("record", GyroNoise(**terms).sample(n, fs, seed), fs, "noise")
+    return RateRecord("record", GyroNoise(**terms).sample(n, fs, seed), fs, "noise")
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def test_low_pass_at_short_tau_is_refused_and_its_white_noise_found_beyond():
     """A gyro's white noise through its low-pass of 480 Hz: no term of the model falls towards short averaging times."""
     gyro = testbed.sensors.load_preset("adis16505")
     readings = gyro.sample(np.zeros(400_000), 20000.0, seed=3)
-    whole = Record("gyro", readings, 2000.0, "gyro")
+    whole = RateRecord("gyro", readings, 2000.0, "gyro")
     assert not analyse(whole).fit.goodness.accepted
     # Twenty times the low-pass's time constant: its share of sigma^2 is under 1.5 / 20 of what is not folded in.
     beyond = analyse(whole, min_tau=0.02)
@@ -212,7 +212,7 @@ def test_a_refused_fit_prints_no_coefficient(tmp_path):
 )
 def test_records_without_noise_or_length_are_refused(rate, message):
     with pytest.raises(ScenarioError, match=message):
-        analyse(Record("x", rate, 100.0, "x"))
+        analyse(RateRecord("x", rate, 100.0, "x"))
 
 
 def test_figure_shows_band_sum_and_each_term():

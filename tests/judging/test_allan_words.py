@@ -10,7 +10,7 @@ import pytest
 
 from testbed.errors import ScenarioError
 from testbed.judging.allan_analysis import analyse
-from testbed.judging.allan_records import Record, read
+from testbed.judging.allan_records import RateRecord, read
 from testbed.judging.allan_words import data_sheet, remarks_on, write_imu
 from testbed.judging.rounding import is_rounding
 from testbed.metrics.lines import spectral_lines
@@ -23,7 +23,7 @@ FS = 200.0
 
 def noise(n=20_000, seed=1, word=0.0, mean=0.0, **terms):
     rate = GyroNoise(**(terms or {"angle_random_walk": N})).sample(n, FS, seed) + mean
-    return Record("noise", np.rint(rate / word) * word if word else rate, FS, "noise", word=word)
+    return RateRecord("noise", np.rint(rate / word) * word if word else rate, FS, "noise", word=word)
 
 
 @pytest.mark.oracle
@@ -96,7 +96,7 @@ def test_finer_rounding_is_taken_off_so_that_the_interval_holds_the_truth(share)
 
 def test_a_constant_record_is_named():
     with pytest.raises(ScenarioError, match="rounded to words above the noise, or not moving at all"):
-        analyse(Record("still", np.zeros(5000), FS, "still"))
+        analyse(RateRecord("still", np.zeros(5000), FS, "still"))
 
 
 @pytest.mark.oracle

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from testbed.errors import ScenarioError
-from testbed.judging.allan_records import Record
+from testbed.judging.allan_records import RateRecord
 from testbed.judging.density import band_edges, difference, estimate_density
+from testbed.judging.density_figure import density_figure
+from testbed.pages.palette import color_of
 from testbed.sensors.noise import GyroNoise
 from tests.cli.test_app import assert_clear, call
 
@@ -17,7 +20,7 @@ N, FS = 1e-4, 500.0
 
 
 def white(n=40_000, seed=1):
-    return Record("noise", GyroNoise(angle_random_walk=N).sample(n, FS, seed), FS, "noise")
+    return RateRecord("noise", GyroNoise(angle_random_walk=N).sample(n, FS, seed), FS, "noise")
 
 
 @pytest.mark.oracle
@@ -54,7 +57,7 @@ def test_95_per_cent_of_the_intervals_hold_the_density(method):
 def test_a_sine_has_its_rms_as_rate_and_as_angle_in_its_band():
     amplitude, freq = 2e-3, 12.5
     rate = white().rate + amplitude * np.sin(2.0 * np.pi * freq * np.arange(40_000) / FS)
-    found = estimate_density(Record("sine", rate, FS, "sine"))
+    found = estimate_density(RateRecord("sine", rate, FS, "sine"))
     low, mid, high = found.bands([1.0, 10.0, 20.0, 200.0])
     # The noise of the band, N sqrt(2 x 10 Hz), is 5 % of the power.
     assert mid.rate == pytest.approx(np.hypot(amplitude / np.sqrt(2.0), N * np.sqrt(20.0)), rel=0.02)
@@ -67,11 +70,11 @@ def test_lost_samples_are_left_out_or_bridged_and_told():
     record = white()
     rate = record.rate.copy()
     rate[20_000:20_100] = np.nan
-    found = estimate_density(Record("gap", rate, FS, "gap"))
+    found = estimate_density(RateRecord("gap", rate, FS, "gap"))
     assert found.notes == ("100 of 40000 samples are missing, left out with their segments",)
     assert found.density.mean() == pytest.approx(2.0 * N**2, rel=0.05)
     rate[::97] = np.nan
-    bridged = estimate_density(Record("gaps", rate, FS, "gaps"))
+    bridged = estimate_density(RateRecord("gaps", rate, FS, "gaps"))
     assert "bridged by straight lines" in bridged.notes[0]
     assert bridged.density.mean() == pytest.approx(2.0 * N**2, rel=0.05)
 
@@ -79,13 +82,13 @@ def test_lost_samples_are_left_out_or_bridged_and_told():
 @pytest.mark.oracle
 def test_a_difference_of_channels_has_the_sum_of_the_noises_and_no_common_signal():
     common = 1e-2 * np.sin(2.0 * np.pi * 3.0 * np.arange(40_000) / FS)
-    first, second = (Record(name, white(seed=s).rate + common, FS, name) for s, name in ((1, "a"), (2, "b")))
+    first, second = (RateRecord(name, white(seed=s).rate + common, FS, name) for s, name in ((1, "a"), (2, "b")))
     found = estimate_density(difference(first, second))
     assert found.density.mean() == pytest.approx(4.0 * N**2, rel=0.05)
-    fast = Record("fast", np.repeat(second.rate, 4), 4.0 * FS, "fast")
+    fast = RateRecord("fast", np.repeat(second.rate, 4), 4.0 * FS, "fast")
     assert np.array_equal(difference(first, fast).rate, first.rate - second.rate)
     with pytest.raises(ScenarioError, match="rates of a whole ratio"):
-        difference(first, Record("odd", second.rate, 333.0, "odd"))
+        difference(first, RateRecord("odd", second.rate, 333.0, "odd"))
 
 
 @pytest.mark.parametrize(
@@ -111,3 +114,19 @@ def test_the_command_prints_bands_writes_a_figure_and_json(tmp_path):
     assert one["cumulative_rate_deg_s"][-1] == pytest.approx(total, rel=0.05)
     for words in (("--method", "x"), ("--segment", "1 h"), ("--column", "c"), ("--out", "a.jpg")):
         assert_clear(call("psd", path, *words, cwd=tmp_path), 2)
+
+
+def test_a_curve_has_the_colour_of_its_name_wherever_it_stands():
+    rng = np.random.default_rng(1)
+    records = [RateRecord(name, rng.standard_normal(4000), 100.0, name) for name in ("gx", "gy", "gz", "heading")]
+    estimates = [estimate_density(record) for record in records]
+    estimates.append(estimate_density(replace(records[0], name="kalman", signal="fusion/kalman")))
+
+    def colors(chosen):
+        lines = density_figure(chosen).axes[0].get_lines()
+        return {line.get_label(): line.get_color() for line in lines}
+
+    forward, alone = colors(estimates), colors(estimates[::-1][:2])
+    assert len({forward[name] for name in ("gx", "gy", "gz", "heading")}) == 4
+    assert alone.items() <= forward.items()
+    assert forward["kalman"] == color_of("fusion/kalman")

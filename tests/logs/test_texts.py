@@ -120,3 +120,69 @@ def test_a_rate_in_the_head_that_contradicts_the_stamps_is_told(tmp_path):
     assert any("contradiction: the file says 52 Hz" in note for note in record.notes)
     (record,) = read(path, Selection(rate="500"))
     assert any("contradiction: the nominal rate is 500 Hz" in note for note in record.notes)
+
+
+def test_lines_that_are_left_out_are_counted_and_the_rest_keeps_its_lines(tmp_path):
+    rows = lines(SECONDS, DEG, head="t,w [deg/s]\n").splitlines()
+    rows[100], rows[200] = "reset", rows[200] + ",7"
+    log = table(tmp_path, "\n".join([*rows, "END"]) + "\n", drop_faulty=True)
+    assert sum(block[1].size for block in log.blocks([0, 1], [0])) == 3998
+    assert log.notes == ["3 lines that are not like the others were left out, the first 'reset'"]
+
+
+def test_only_lines_with_a_word_are_read_and_a_fault_keeps_its_line(tmp_path):
+    rows = "".join(f"GPS,{k},1,2\nIMU,{k},{w}\n" for k, w in enumerate(DEG[:200]))
+    log = table(tmp_path, rows, only="IMU")
+    np.testing.assert_allclose(next(log.blocks([2]))[2], RATE[:200])
+    assert log.line(5) == 12
+    with pytest.raises(ScenarioError) as caught:
+        list(table(tmp_path, rows.replace("IMU,150,", "IMU,150,x"), only="IMU").blocks([2]))
+    assert caught.value.problems[0].line == 302
+    with pytest.raises(ScenarioError, match="no line with the word 'GYR'"):
+        table(tmp_path, rows, only="GYR")
+
+
+def test_a_number_that_means_none_is_missing_however_it_is_written(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(lines(SECONDS, [*DEG[:500], "-9999.000", *DEG[501:]], head="t,w [deg/s]\n"))
+    (record,) = read(path)
+    assert any("-9999 stands 1 times" in note and "--missing -9999" in note for note in record.notes)
+    (record,) = read(path, text=TextOptions(missing="-9999"))
+    assert np.flatnonzero(np.isnan(record.rate)).tolist() == [500]
+    assert record.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("Time,Gyro,Gyro\n,x,y\n", ["Time", "Gyro x", "Gyro y"]),
+        ("t,x,y\n[s],[deg/s],[deg/s]\na,b,c\n", ["t", "x", "y"]),
+        ("a,b,b\nt,x,y\n", ["t", "x", "y"]),
+    ],
+)
+def test_of_several_lines_above_the_rows_the_names_are_found(tmp_path, head, names):
+    assert [c.name for c in table(tmp_path, head + "0.1,2.5,3\n" * 40).columns] == names
+
+
+def test_a_slow_channel_between_quick_ones_has_its_own_rate(tmp_path):
+    slow = [w if k % 5 == 2 else "" for k, w in enumerate(DEG)]
+    path = tmp_path / "log.csv"
+    path.write_text(lines(SECONDS, slow, DEG, head="t,slow [deg/s],fast [deg/s]\n"))
+    slow_record, fast = read(path)
+    assert (slow_record.sample_rate_hz, fast.sample_rate_hz) == (pytest.approx(200.0), pytest.approx(1000.0))
+    np.testing.assert_allclose(slow_record.rate, np.deg2rad(RATE[2::5]), rtol=1e-12)
+
+
+def test_hexadecimal_words_have_the_sign_of_their_size(tmp_path):
+    log = table(tmp_path, "a,b\n" + "0x0005,0x7f\n0xFFFB,0x80\n" * 30)
+    block = next(log.blocks([0, 1]))
+    assert block[0][:2].tolist() == [5, -5]
+    assert block[1][:2].tolist() == [127, -128]
+    assert "hexadecimal words of 8 bits" in str(log.dialect)
+
+
+def test_json_in_one_piece_is_named(tmp_path):
+    path = tmp_path / "log.json"
+    path.write_text('[{"t": 0, "w": 1}, {"t": 1, "w": 2}]')
+    with pytest.raises(ScenarioError, match="JSON in one piece"):
+        read(path)

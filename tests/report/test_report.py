@@ -15,14 +15,23 @@ import pytest
 import testbed
 from testbed.errors import ScenarioError
 from testbed.pages.numbers import fixed, significant
-from testbed.report import write_report
+from testbed.report import run_figures, save_figures, write_report
 from testbed.report.digest import digest_run, zoom_window
+from testbed.runs.manifest import strangers
 from testbed.runs.metrics import RunMetrics
 from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+SMALL = {
+    "name": "small",
+    "duration": "0.4 s",
+    "settle": "0.2 s",
+    "motion": [{"sine": {"frequency": "10 Hz", "rate": "1 deg/s"}}],
+    "sensors": {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}},
+    "fusion": {"kalman": {}},
+}
 BASE_HZ, GYRO_HZ = 20000.0, 2000.0
 
 
@@ -485,3 +494,21 @@ def test_gain_and_phase_are_shown_with_their_intervals(tmp_path: Path):
     assert cells["0.5", "kalman", "gain"] == (0.19743, "0.197± 0.003")
     assert cells["208.0", "kalman", "gain"] == (0.2, "0.2± 0.5")
     assert cells["208.0", "kalman", "phase_deg"] == (12.0, "lost")
+
+
+def test_figures_for_elsewhere_are_whole_known_to_the_manifest_and_repeatable(tmp_path: Path):
+    """Each is what its name says, a rerun may replace them, and equal runs give equal files."""
+    run = testbed.run(testbed.Scenario.from_dict(SMALL), out=tmp_path / "run")
+    assert run.folder is not None
+    written = save_figures(run.folder)
+    names = set(run_figures(run))
+    assert {path.name for path in written} == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf", "png")}
+    first = {path: path.read_bytes() for path in written}
+    for path, content in first.items():
+        start = {".svg": b"<?xml", ".pdf": b"%PDF-", ".png": b"\x89PNG\r\n"}[path.suffix]
+        assert content.startswith(start)
+        assert content.rstrip().endswith({".svg": b"</svg>", ".pdf": b"%%EOF", ".png": b"IEND\xaeB`\x82"}[path.suffix])
+    assert strangers(run.folder) == []
+    assert {path: path.read_bytes() for path in save_figures(run.folder)} == first
+    testbed.run(testbed.Scenario.from_dict(SMALL), out=tmp_path / "run")
+    assert not (tmp_path / "run" / "figures").exists()

@@ -30,6 +30,7 @@ from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from testbed.sensors.mhd_ars import MhdArs
@@ -132,7 +133,7 @@ def test_only_what_exists_is_promised(tmp_path: Path) -> None:
             list(run_paper(name, 1, tmp_path))
     taken = tmp_path / "file"
     taken.write_text("")
-    with pytest.raises(ScenarioError, match="--out: expected a folder"):
+    with pytest.raises(ScenarioError, match="exists and is no folder"):
         list(run_paper("paper2", 1, taken))
     assert CliRunner().invoke(app, ["reproduce", "paper2", "--seeds", "0"]).exit_code == 2
 
@@ -140,9 +141,35 @@ def test_only_what_exists_is_promised(tmp_path: Path) -> None:
 def test_seeds_that_are_not_asked_for_are_the_papers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Table II's median and spread are over ten."""
     assert SEEDS.keys() == PAPERS.keys()
-    monkeypatch.setattr("testbed.reproduce.paper1.report", lambda seeds, out: [f"{seeds} seeds in {out.name}"])
-    assert list(run_paper("paper1", None, tmp_path / "new")) == ["10 seeds in new"]
-    assert list(run_paper("paper1", 3, tmp_path / "new")) == ["3 seeds in new"]
+    monkeypatch.setattr("testbed.reproduce.paper1.report", lambda seeds, _out: [f"{seeds} seeds"])
+    assert list(run_paper("paper1", None, tmp_path / "new")) == ["10 seeds"]
+    assert list(run_paper("paper1", 3, tmp_path / "new")) == ["3 seeds"]
+
+
+def test_what_a_paper_writes_appears_whole_and_replaces_only_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until the last table is written the earlier ones stand there, and somebody's own file is never replaced."""
+
+    def report(seeds: int, out: Path) -> Iterator[str]:
+        (out / "one.csv").write_text(str(seeds))
+        yield "half"
+        (out / "two.csv").write_text(str(seeds))
+
+    monkeypatch.setattr("testbed.reproduce.paper1.report", report)
+    place = tmp_path / "paper1"
+    list(run_paper("paper1", 1, place))
+    lines = run_paper("paper1", 2, place)
+    assert next(lines) == "half"
+    assert {path.name: path.read_text() for path in place.glob("*.csv")} == {"one.csv": "1", "two.csv": "1"}
+    lines.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["paper1"]
+    list(run_paper("paper1", 2, place))
+    assert {path.read_text() for path in place.glob("*.csv")} == {"2"}
+    (place / "mine.txt").write_text("mine")
+    with pytest.raises(ScenarioError, match=r"mine\.txt"):
+        list(run_paper("paper1", 3, place))
+    assert (place / "mine.txt").read_text() == "mine"
 
 
 def settled_filter() -> tuple[Any, FloatArray, FloatArray]:

@@ -136,7 +136,7 @@ def test_a_link_goes_on_pointing_to_the_run(tmp_path):
 def test_links_in_a_circle_are_refused(tmp_path):
     (tmp_path / "a").symlink_to("b")
     (tmp_path / "b").symlink_to("a")
-    with pytest.raises(ScenarioError, match="is no run folder"):
+    with pytest.raises(ScenarioError, match="is no folder of the testbed"):
         small_run(tmp_path / "a")
 
 

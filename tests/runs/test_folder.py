@@ -129,7 +129,7 @@ def test_an_empty_folder_is_taken_and_anything_else_is_refused(tmp_path):
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
     (tmp_path / "file").write_text("a file")
     for name in ("thesis", "file"):
-        with pytest.raises(ScenarioError, match="is no run folder"):
+        with pytest.raises(ScenarioError, match="is no folder of the testbed"):
             testbed.run(short(tmp_path), out=tmp_path / name)
     assert (tmp_path / "thesis" / "chapter.tex").read_text() == "years of work"
 

@@ -76,7 +76,7 @@ def test_a_missing_file_and_what_a_file_browser_leaves_are_no_obstacle(tmp_path)
 def test_a_refused_run_simulates_nothing(stored, tmp_path, monkeypatch):
     monkeypatch.setattr("testbed.chain.runner.simulate", None)
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(ScenarioError, match=r"no run folder of the testbed \(it has no manifest"):
+    with pytest.raises(ScenarioError, match=r"no folder of the testbed \(it has no manifest"):
         testbed.run(stored[0], out=tmp_path)
 
 
@@ -116,14 +116,14 @@ def test_a_death_between_manifest_and_file_leaves_both_valid(tmp_path, monkeypat
 
     monkeypatch.setattr("testbed.runs.manifest.write_bytes", die)
     with pytest.raises(KeyboardInterrupt):
-        rewrite(place, "a.txt", "second")
+        rewrite(place, "a.txt", b"second")
     assert strangers(place) == []
     monkeypatch.undo()
-    rewrite(place, "a.txt", "third")
+    rewrite(place, "a.txt", b"third")
     assert strangers(place) == []
     assert (place / "a.txt").read_text() == "third"
 
 
 def test_a_folder_without_manifest_may_have_its_report_written_again(tmp_path):
-    rewrite(tmp_path, "a.txt", "text")
+    rewrite(tmp_path, "a.txt", b"text")
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]

@@ -28,7 +28,11 @@ def reproduce(
     out: Annotated[Path | None, typer.Option(help="Folder for tables and figures; default runs/<paper>.")] = None,
 ) -> None:
     """Repeat the measurements of paper1, paper2 or paper3 and print its numbers beside ours."""
+    from testbed.cli.console import print_written
+
     folder = out or Path("runs") / paper
     for line in run_paper(paper, seeds, folder):
         output.say(line)
-    output.show({"paper": paper, "tables": paper_tables(paper, folder), "written": str(folder)}, lambda: None)
+    output.show(
+        {"paper": paper, "tables": paper_tables(paper, folder), "written": str(folder)}, lambda: print_written(folder)
+    )

@@ -148,8 +148,12 @@ def _cached(
         search.best(order, np.logspace(*DECADES[order], DECADES[order][1] - DECADES[order][0] + 1)) for order in _ORDERS
     ]
     best = [min(found, key=lambda one: one.rmse) for found in zip(*coarse, strict=True)]
-    around = {order: [one.q * _QUARTERS for one in best if one.order == order] for order in _ORDERS}
-    for order, near in ((order, np.unique(found)) for order, found in around.items() if found):
+    for order in _ORDERS:
+        # Refined candidates of a lower order may have taken all that this one had.
+        of_order = [one.q * _QUARTERS for one in best if one.order == order]
+        if not of_order:
+            continue
+        near = np.unique(np.concatenate(of_order))
         best = [min(pair, key=lambda one: one.rmse) for pair in zip(best, search.best(order, near), strict=True)]
     return best
 

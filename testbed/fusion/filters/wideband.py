@@ -107,6 +107,11 @@ class Wideband(ModelFilter):
         self._columns = _columns(self.model.F), _columns(self.model.H)
         self._run = bank_kernel(len(self._x), self._R.size, q.size, self._form, self.model.n_slow)
 
+    @property
+    def step_seconds(self) -> float:
+        """About how long a step of all filters of the bank takes, compiled, on a core of 2020 [s]."""
+        return self._levels.size * super().step_seconds
+
     def _noise_of_bank(
         self,
         belief: Mapping[str, SensorBelief],

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.errors import ScenarioError
 from testbed.logs.options import refusal
 from testbed.logs.table import TableColumn
 
@@ -101,18 +103,41 @@ class ArrayTable:
             raise refusal(self.path, f"expected columns of one length, got {names}", "--time")
         guard(self.path, self.format, 8 * sum(sizes))
         for start in range(0, sizes[0], _BLOCK):
-            try:
+            with damage_refused(self.path, self.format, OSError, ValueError, EOFError, RuntimeError):
                 block = {i: self.parts[i](start, min(start + _BLOCK, sizes[0])) for i in wanted}
-            except (OSError, ValueError, EOFError, RuntimeError) as error:
-                names = ", ".join(repr(self.columns[i].name) for i in wanted)
-                raise refusal(
-                    self.path, f"{names} cannot be read ({self.format}): {error}; is the file cut?"
-                ) from error
             yield {i: exact(values) if i in stamps else np.asarray(values, np.float64) for i, values in block.items()}
 
     def line(self, row: int) -> int | None:
         """Return None: there are no lines."""
         return None
+
+
+@contextmanager
+def damage_refused(path: Path, kind: str, *errors: type[Exception]) -> Iterator[None]:
+    """Refuse a file that its library cannot read, with what the library says of it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Its format.
+    *errors : type of Exception
+        What the library raises; any exception if left out, for few say which.
+
+    Raises
+    ------
+    ScenarioError
+        Instead of them.
+    """
+    try:
+        yield
+    except ScenarioError:
+        raise
+    except Exception as error:
+        if errors and not isinstance(error, errors):
+            raise
+        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut or damaged?") from error
 
 
 def exact(values: NDArray[Any]) -> NDArray[Any]:

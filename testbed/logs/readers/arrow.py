@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import MOST_COLUMNS, exact, guard
+from testbed.logs.readers.arrays import MOST_COLUMNS, damage_refused, exact, guard
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -43,10 +43,8 @@ class ArrowTable:
 
         self.path, self.format = path, kind
         self.notes: list[str] = []
-        try:
+        with damage_refused(path, kind, pa.ArrowException, OSError):
             self._file, schema, n_time = self._open(kind)
-        except (pa.ArrowException, OSError) as error:
-            raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
         if len(schema) > MOST_COLUMNS:
             raise refusal(path, f"expected at most {MOST_COLUMNS} columns, got {len(schema)}: write one sample a row")
         self._names = [field.name for field in schema if _is_number(field.type)]
@@ -61,15 +59,13 @@ class ArrowTable:
 
         guard(self.path, self.format, 8 * len(wanted) * (self.columns[0].n_time or 0))
         names = [self._names[i] for i in wanted]
-        try:
+        with damage_refused(self.path, self.format, pa.ArrowException, OSError):
             for batch in self._batches(names):
                 if batch.num_rows:
                     yield {
                         i: _array(batch.column(batch.schema.get_field_index(n)), i in stamps)
                         for i, n in zip(wanted, names, strict=True)
                     }
-        except (pa.ArrowException, OSError) as error:
-            raise refusal(self.path, f"cannot be read ({self.format}): {error}; is the file damaged?") from error
 
     def line(self, row: int) -> int | None:
         """Return None: there are no lines."""

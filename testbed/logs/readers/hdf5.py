@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -38,10 +37,8 @@ def open_hdf5(path: Path, kind: str) -> ArrayTable:
     """
     import h5py
 
-    try:
+    with damage_refused(path, kind, OSError):
         file = h5py.File(path)
-    except OSError as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
     table = ArrayTable(path, kind, header=_words(file))
 
     def visit(name: str, node: Any) -> None:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -29,15 +28,16 @@ def open_ide(path: Path, kind: str) -> ArrayTable:
     ScenarioError
         If it is damaged, or an EBML file of another kind.
     """
-    import idelib
+    from idelib import importer
 
-    try:
-        dataset = idelib.importFile(str(path))
-        table = ArrayTable(path, kind)
+    table = ArrayTable(path, kind)
+    with path.open("rb") as stream, damage_refused(path, kind):
+        dataset = importer.openFile(stream)
+        importer.readData(dataset)
         for channel in dataset.channels.values():
-            _add(table, channel)
-    except Exception as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
+            # Channels that a recorder of its kind has, but this one did not record, cannot be asked.
+            if channel.sessions:
+                _add(table, channel)
     return table
 
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -34,11 +33,12 @@ def open_mdf(path: Path, kind: str) -> ArrayTable:
     """
     from asammdf import MDF
 
-    try:
-        file = MDF(path)
-    except Exception as error:
-        _let_go(error)
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
+    with damage_refused(path, kind):
+        try:
+            file = MDF(path)
+        except Exception as error:
+            _let_go(error)
+            raise
     table = ArrayTable(path, kind)
     weakref.finalize(table, file.close)
     several = len(file.groups) > 1

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.errors import ScenarioError
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable, guard
+from testbed.logs.readers.arrays import ArrayTable, damage_refused, guard
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -39,16 +37,11 @@ def open_miniseed(path: Path, kind: str) -> ArrayTable:
     """
     from obspy import read
 
-    try:
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            heads = read(path, format="MSEED", headonly=True)
-            guard(path, kind, sum(8 * trace.stats.npts for trace in heads))
-            stream = read(path, format="MSEED")
-    except ScenarioError:
-        raise
-    except Exception as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
+    with damage_refused(path, kind), warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        heads = read(path, format="MSEED", headonly=True)
+        guard(path, kind, sum(8 * trace.stats.npts for trace in heads))
+        stream = read(path, format="MSEED")
     table = ArrayTable(path, kind, notes=list(dict.fromkeys(str(one.message) for one in told)))
     for name in dict.fromkeys(trace.id for trace in stream):
         pieces = sorted((trace for trace in stream if trace.id == name), key=lambda trace: trace.stats.starttime)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable, guard
+from testbed.logs.readers.arrays import ArrayTable, damage_refused, guard
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -23,10 +22,8 @@ def open_npy(path: Path) -> ArrayTable:
     ScenarioError
         If it is damaged, or holds Python objects.
     """
-    try:
+    with damage_refused(path, "npy"):
         data = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise refusal(path, f"cannot be read (npy): {error}; is the file cut?") from error
     table = ArrayTable(path, "npy")
     table.add_array(TableColumn(""), data)
     return table
@@ -41,15 +38,13 @@ def open_npz(path: Path) -> ArrayTable:
         If it is damaged, holds Python objects, or claims far more than it can hold.
     """
     table = ArrayTable(path, "npz")
-    try:
+    with damage_refused(path, "npz"):
         with zipfile.ZipFile(path) as archive:
             members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
             guard(path, "npz", sum(info.file_size for info in members))
         content = np.load(path, allow_pickle=False)
         for name in content.files:
             _add(table, name, content[name])
-    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise refusal(path, f"cannot be read (npz): {error}; is the file cut?") from error
     return table
 
 
@@ -70,10 +65,8 @@ def open_netcdf3(path: Path) -> ArrayTable:
     """
     from scipy.io import netcdf_file
 
-    try:
+    with damage_refused(path, "NetCDF 3"):
         file = netcdf_file(path, mmap=False, maskandscale=False)
-    except (OSError, ValueError, TypeError, KeyError, EOFError, IndexError, MemoryError) as error:
-        raise refusal(path, f"cannot be read (NetCDF 3): {error}; is the file cut?") from error
     table = ArrayTable(path, "NetCDF 3")
     for name, variable in file.variables.items():
         data = np.asarray(variable.data)

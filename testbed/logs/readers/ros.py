@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -44,11 +43,9 @@ def open_ros(path: Path, kind: str) -> ArrayTable:
         If it is damaged, or its messages are of a kind that is not known.
     """
     rows: dict[str, list[Row]] = {}
-    try:
+    with damage_refused(path, kind):
         for topic, row in _json_rows(path) if kind == "MCAP" and _is_json(path) else _rows(path, kind):
             rows.setdefault(topic, []).append(row)
-    except Exception as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
     table = ArrayTable(path, kind)
     for topic, found in rows.items():
         names = [name for name in found[0] if all(name in row for row in found)]

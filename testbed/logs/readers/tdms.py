@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import weakref
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ def open_tdms(path: Path, kind: str) -> ArrayTable:
     from nptdms import TdmsFile
 
     stream = path.open("rb")
-    try:
+    with damage_refused(path, kind), ExitStack() as left:
+        left.enter_context(stream)
         file = TdmsFile.open(stream)
-    except Exception as error:
-        stream.close()
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
+        # It reads as it is asked, so that the file stays open.
+        left.pop_all()
     table = ArrayTable(path, kind, header={str(key): str(value) for key, value in file.properties.items()})
     weakref.finalize(table, stream.close)
     several = len(file.groups()) > 1

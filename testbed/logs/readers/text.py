@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from testbed.errors import quoted
-from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, fields_of, find_dialect
+from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, find_dialect, word_pattern
 from testbed.logs.options import refusal
 from testbed.logs.selection import TextOptions
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -35,7 +35,9 @@ _TIME_COMMA = re.compile(rb"(:\d\d),(\d)")
 # Digits after the point that stamps are exact to.
 _DIGITS = 9
 _MARKS = tuple(mark.encode() for mark in COMMENTS)
-_NULLS = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
+# The last ones are what spreadsheets and Microsoft's C library write.
+_NULLS = ["", "NaN", "nan", "NAN", "-nan", "NA", "N/A", "n/a", "NULL", "null", "None", "none", "-"]
+_NULLS += ["#N/A", "#DIV/0!", "#VALUE!", "#REF!", "#NUM!", "1.#QNAN", "-1.#IND", "1.#IND", "-nan(ind)", "nan(ind)"]
 
 
 class TextTable:
@@ -68,6 +70,9 @@ class TextTable:
         said = options or TextOptions()
         self.dialect: Dialect = find_dialect(path, head, complete=complete, options=said)
         self._nulls = [*_NULLS, said.missing] if said.missing else _NULLS
+        self._missing = float(said.missing) if said.missing and _is_number(said.missing) else None
+        self._drop, self._dropped = said.drop_faulty, Dropped()
+        self.said = said
         self.unreadable = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind == "text")
         self.format = f"text: {self.dialect}"
         self.header = self.dialect.preamble
@@ -76,7 +81,7 @@ class TextTable:
 
     def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
         """Yield the wanted columns block by block; ScenarioError with the line of a row that is not like the others."""
-        self.notes = []
+        self.notes, self._dropped = [], Dropped()
         types = self._types(wanted, stamps)
         line = 1
         for raw, last in self._raw():
@@ -89,6 +94,7 @@ class TextTable:
                 if next(iter(block.values())).size:
                     yield block
             line += raw.count(b"\n")
+        self.notes += self._dropped.said()
 
     def line(self, row: int) -> int | None:
         """Return the line of a row, counted from 0."""
@@ -136,6 +142,10 @@ class TextTable:
         # The search for a letter is quick; lines are looked at one by one only where there is one.
         if any(mark in raw for mark in _MARKS):
             raw = b"\n".join(row for row in raw.split(b"\n") if not row.lstrip().startswith(_MARKS))
+        if self.dialect.only is not None:
+            word = re.compile(word_pattern(self.dialect.only).encode(self.dialect.raw_encoding))
+            raw = b"\n".join(row for row in raw.split(b"\n") if word.search(row))
+        raw = self.dialect.ornaments.off_bytes(raw, self.dialect.raw_encoding)
         if "iso" in self.dialect.kinds or "clock" in self.dialect.kinds:
             raw = _DAY_FIRST.sub(rb"\3-\2-\1\4", raw)
             raw = raw if self.dialect.separator == "," else _TIME_COMMA.sub(rb"\1.\2", raw)
@@ -150,6 +160,9 @@ class TextTable:
         try:
             return self._convert(content, types)
         except pa.ArrowInvalid as error:
+            rest = self._dropped.take(content, lambda text: self._fault_in(text, types)) if self._drop else content
+            if rest != content:
+                return self._parse(rest, types, line, raw, last=last) if rest else {i: np.empty(0) for i in types}
             if any(pa.types.is_decimal(kind) for kind in types.values()):
                 # More digits than that, or an odd field: as floats, which name it.
                 plain = {i: pa.float64() if pa.types.is_decimal(kind) else kind for i, kind in types.items()}
@@ -164,11 +177,16 @@ class TextTable:
         """Return what each column is to become."""
         import pyarrow as pa
 
-        exact = {"integer": pa.int64(), "clock": pa.time64("ns"), "number": pa.decimal128(38, _DIGITS)}
+        exact = {
+            "integer": pa.int64(),
+            "hex": pa.int64(),
+            "clock": pa.time64("ns"),
+            "number": pa.decimal128(38, _DIGITS),
+        }
         types = {}
         for i in wanted:
             kind = self.dialect.kinds[i]
-            types[i] = exact.get(kind, pa.float64()) if i in stamps else pa.float64()
+            types[i] = exact.get(kind, pa.float64()) if i in stamps or kind == "hex" else pa.float64()
             if kind == "iso" and i in stamps:
                 types[i] = pa.timestamp("ns", "UTC" if self._has_zone(i) else None)
         return types
@@ -192,7 +210,18 @@ class TextTable:
                 check_utf8=False,
             ),
         )
-        return {i: _plain(table.column(str(i))) for i in types}
+        return {i: self._in_words(i, _plain(table.column(str(i)))) for i in types}
+
+    def _in_words(self, index: int, values: NDArray[Any]) -> NDArray[Any]:
+        """Return hexadecimal words as whole numbers with their sign, numbers that mean none as NaN."""
+        if self._missing is not None and values.dtype.kind == "f":
+            # However many digits it is written with.
+            values = np.where(values == self._missing, np.nan, values)
+        bits = self.dialect.hex_bits.get(index)
+        if bits is None:
+            return values
+        signed: NDArray[Any] = values - (values >= 1 << (bits - 1)) * (1 << bits)
+        return signed
 
     def _has_zone(self, index: int) -> bool:
         cell = next((row[index] for _, row in self._rows() if len(row) > index and ISO.fullmatch(row[index])), "")
@@ -202,53 +231,94 @@ class TextTable:
         """Yield line and fields of each row."""
         with self.path.open(encoding=self.dialect.encoding, errors="replace") as stream:
             for line, text in enumerate(stream, 1):
-                if line > self.dialect.skip and text.strip() and not text.lstrip().startswith(COMMENTS):
-                    yield line, fields_of(text.rstrip("\r\n"), self.dialect.separator)
+                if line > self.dialect.skip and self.dialect.is_row(text):
+                    yield line, self.dialect.fields(text)
 
     def _refuse_fault(self, raw: bytes, line: int, types: dict[int, Any], reason: str) -> NoReturn:
         """Find the first row that is not like the others, and refuse it with its line."""
         dialect = self.dialect
         for number, text in enumerate(raw.decode(errors="replace").split("\n"), line):
-            if number <= dialect.skip or not text.strip() or text.lstrip().startswith(COMMENTS):
-                continue
-            fields = fields_of(text.rstrip("\r"), dialect.separator)
-            if len(fields) != dialect.n_columns:
-                self._refuse(
-                    f"expected {dialect.n_columns} fields ({dialect}), got {len(fields)}: {text.strip()[:60]!r}; "
-                    "mend or remove the line",
-                    number,
-                )
-            for index, kind in types.items():
-                self._refuse_field(fields[index], index, str(kind), number)
+            if number > dialect.skip and dialect.is_row(text):
+                fault = self._fault_in(text, types)
+                if fault:
+                    self._refuse(fault, number)
         self._refuse(f"cannot be read: {reason[:200]}", line)
 
-    def _refuse_field(self, field: str, index: int, kind: str, line: int) -> None:
-        """Refuse a field that is not of its kind, a type of pyarrow by name."""
-        label = repr(self.columns[index].name)
+    def _fault_in(self, text: str, types: Mapping[int, Any]) -> str:
+        """Return what is wrong with a row; empty if nothing."""
+        dialect = self.dialect
+        fields = dialect.fields(text)
+        if len(fields) != dialect.n_columns:
+            got = f"expected {dialect.n_columns} fields ({dialect}), got {len(fields)}: {text.strip()[:60]!r}"
+            return f"{got}; mend or remove the line, or --drop-faulty, or --only WORD that all rows hold"
+        faults = (self._fault_of(fields[index], index, str(kind)) for index, kind in types.items())
+        return next(filter(None, faults), "")
+
+    def _fault_of(self, field: str, index: int, kind: str) -> str:
+        """Return why a field is not of its kind, a type of pyarrow by name; empty if it is."""
+        label, number = (
+            repr(self.columns[index].name),
+            field.replace(",", ".") if self.dialect.decimal == "," else field,
+        )
         if field in self._nulls:
-            return
+            return ""
         if kind.startswith("time"):
-            if not (ISO if kind.startswith("timestamp") else CLOCK).fullmatch(field):
-                self._refuse(
-                    f"expected a time such as the first ones in {label}, got {quoted(field)}; mend the line", line
-                )
-            return
-        try:
-            float(field.replace(",", ".") if self.dialect.decimal == "," else field)
-        except ValueError:
-            remedy = "write a decimal point or give --decimal ," if "," in field else _remedy(field)
-            self._refuse(f"expected a finite number in {label}, got {quoted(field)}; {remedy}", line)
-        if kind == "int64" and not re.fullmatch(r"[+-]?\d+", field):
-            self._refuse(
-                f"expected a whole number in {label}, as in the first rows, got {quoted(field)}; mend the line", line
+            good = (ISO if kind.startswith("timestamp") else CLOCK).fullmatch(field)
+            what = f"expected a time such as the first ones in {label}, got {quoted(field)}"
+            return "" if good else f"{what}; mend the line, or --drop-faulty"
+        if self.dialect.kinds[index] == "hex":
+            good = re.fullmatch(r"0[xX][0-9A-Fa-f]{1,8}", field)
+            return "" if good else f"expected a hexadecimal word in {label}, got {quoted(field)}; mend the line"
+        if not _is_number(number):
+            remedy = (
+                "write a decimal point or give --decimal ," if _is_number(field.replace(",", ".")) else _remedy(field)
             )
+            return f"expected a finite number in {label}, got {quoted(field)}; {remedy}"
+        whole = kind != "int64" or re.fullmatch(r"[+-]?\d+", field)
+        what = f"expected a whole number in {label}, as in the first rows, got {quoted(field)}"
+        return "" if whole else f"{what}; mend the line, or --drop-faulty"
 
     def _refuse(self, message: str, line: int | None = None) -> NoReturn:
         raise refusal(self.path, message, line=line)
 
 
+def _is_number(field: str) -> bool:
+    # Python takes 1_000 for a number, and no logger writes it.
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return "_" not in field
+
+
 def _remedy(field: str) -> str:
-    return f"fill it, cut the record, or give --missing {field!r} if that means none"
+    if re.fullmatch(r"[0-9A-Fa-f]{2,8}", field):
+        return "if these are hexadecimal words, write 0x before them"
+    return f"fill it, cut the record, give --missing {field!r} if that means none, or --drop-faulty"
+
+
+class Dropped:
+    """Lines that were left out because they are not like the others."""
+
+    def __init__(self) -> None:
+        self._count, self._first = 0, ""
+
+    def take(self, content: bytes, fault: Callable[[str], str]) -> bytes:
+        """Return the lines of `content` in which there is no fault, and count the others."""
+        kept = []
+        for row in content.split(b"\n"):
+            text = row.decode(errors="replace")
+            if text.strip() and fault(text):
+                self._count += 1
+                self._first = self._first or text.strip()[:60]
+            else:
+                kept.append(row)
+        return b"\n".join(kept)
+
+    def said(self) -> list[str]:
+        """Return how many there were, and the first."""
+        first = f"{self._count} lines that are not like the others were left out, the first {self._first!r}"
+        return [first] if self._count else []
 
 
 def _plain(column: Any) -> NDArray[Any]:

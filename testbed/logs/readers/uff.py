@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -33,10 +32,8 @@ def open_uff(path: Path, kind: str) -> ArrayTable:
     """
     import pyuff
 
-    try:
+    with damage_refused(path, kind):
         sets = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
     table = ArrayTable(path, kind)
     for number, one in enumerate(sets if isinstance(sets, list) else [sets], 1):
         if one.get("type") == 58 and one.get("func_type") == _TIME_RESPONSE and one.get("abscissa_spacing") == 1:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from testbed.logs.options import refusal
-from testbed.logs.readers.arrays import ArrayTable
+from testbed.logs.readers.arrays import ArrayTable, damage_refused
 from testbed.logs.table import TableColumn
 
 if TYPE_CHECKING:
@@ -34,10 +33,8 @@ def open_ulog(path: Path, kind: str) -> ArrayTable:
     """
     from pyulog import ULog
 
-    try:
+    with damage_refused(path, kind):
         log = ULog(str(path))
-    except Exception as error:
-        raise refusal(path, f"cannot be read ({kind}): {error}; is the file cut?") from error
     table = ArrayTable(path, kind)
     if log.file_corruption:
         table.notes.append("the log is damaged: what could be read of it is used")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Random(Motion):
     r"""Gaussian random rate with the constant two-sided density in a band and nothing outside.
 
-    The density is `psd` for `low` <= |f| <= `high`.
+    The density is `psd` for frequencies f of either sign from `low` to `high`.
 
     One realisation of `testbed.models.turntable.realisation.gaussian_rate`; the variance is 2 S (high - low).
 

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from testbed import units
 from testbed.errors import Problem, ScenarioError
-from testbed.inputs.files import read_bytes
+from testbed.inputs.files import beside_scenario, read_bytes
 from testbed.logs.clock import NANO
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import ChannelMap, TimeMap
@@ -38,20 +38,7 @@ _ECHO = re.compile(r"""; the header has|, got ['"]|: ['"]""")
 
 
 def _beside_scenario(path: Path, info: ValidationInfo) -> Path:
-    """Take a relative path from the scenario's folder, not from where the command is typed, and stay in there."""
-    context = info.context or {}
-    if not context.get("folder"):
-        return path
-    folder = Path(context["folder"]).resolve()
-    try:
-        place = (folder / path).resolve()
-    except (OSError, ValueError, RuntimeError) as error:
-        msg = "expected a path"
-        raise ValueError(msg) from error
-    if not place.is_relative_to(folder) and not context.get("allow_outside"):
-        msg = "expected a file in the scenario's folder; --allow-outside (allow_outside=True) lets it read others"
-        raise ValueError(msg)
-    return place
+    return beside_scenario(path, info.context or {})
 
 
 class Column(Part):

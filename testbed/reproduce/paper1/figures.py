@@ -81,7 +81,7 @@ def write_figures(rates: Mapping[str, FloatArray], out: Path, protocol: FusionPr
         One line.
     """
     yield ""
-    yield f"figures (SVG and PNG, the numbers in CSV) in {out}"
+    yield "figures (SVG and PNG, the numbers in CSV)"
     points = stepped_sine()
     for name, tables, draw in (
         ("figure_2", slip_error(), draw_slip_error),
