@@ -1,6 +1,6 @@
 """Any start, any gap, slow noise: errors and claims of the filters over many seeds against the limits promised.
 
-    python benchmarks/estimation.py starts|faults|slow [SEEDS [FILTER,...]]
+    python benchmarks/estimation.py starts|faults|slow|rest [SEEDS [FILTER,...]]
 
 20 seeds take 10 to 30 minutes of processor time; the tests marked slow run a few. Exits with 1 if a limit is missed.
 Records are the readings of the shipped instruments (belief `identified`), motion as a formula.
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from testbed.signals import FloatArray
-from tests.records import DEG, FS, RATES, cut, judged, mixed, offset_mixed, record, rms
+from tests.records import DEG, FS, RATES, cut, judged, left_by, mixed, offset_mixed, record, rms
 
 HONEST = ("kalman", "steady_state", "wideband", "arw_shakf")
 LIMITS = dict.fromkeys(FILTERS, (0.0045, 0.0045)) | {
@@ -103,15 +103,19 @@ def faults(seeds: int, names: Sequence[str]) -> Iterator[Row]:
 
 
 def slow(seeds: int, names: Sequence[str]) -> Iterator[Row]:
-    """Yield the last 100 s of 200 s with states for slow noise and without, on the same seeds."""
+    """Yield the last 100 s of 200 s with states for slow noise and without, on the same seeds; `steady_state` for the
+    10 Hz of the motion, since the even one leaves as much of the white noise as there is of the slow one.
+    """
     every = {"steady_state": 0.7, "wideband": 0.7, "kalman": 0.85}
     limits = {name: limit for name, limit in every.items() if name in names}
     runs: dict[tuple[str, bool], list[tuple[float, float]]] = {}
     for seed in range(seeds):
         whole = record(mixed, 200.0, seed)
         for name in limits:
+            own = {"frequency": 10.0, "amplitude": 0.18 * DEG} if name == "steady_state" else {}
             for coloured in (True, False):
-                runs.setdefault((name, coloured), []).append(judged(name, *whole, 100.0, 200.0, coloured=coloured))
+                error = judged(name, *whole, 100.0, 200.0, coloured=coloured, **own)
+                runs.setdefault((name, coloured), []).append(error)
     for name, limit in limits.items():
         (with_states, claim), (white, of_white) = (
             [rms(np.array(column)) for column in zip(*runs[name, coloured], strict=True)] for coloured in (True, False)
@@ -122,7 +126,21 @@ def slow(seeds: int, names: Sequence[str]) -> Iterator[Row]:
         yield name, f"{words}, ratio {ratio:.2f}", good
 
 
-PARTS: dict[str, Callable[[int, Sequence[str]], Iterator[Row]]] = {"starts": starts, "faults": faults, "slow": slow}
+def rest(_: int, __: Sequence[str]) -> Iterator[Row]:
+    """Yield the exact standard deviation 10 to 14 s after either start, white noise and exact models, for designs from
+    one of a still table to the even one of `steady_state`: what knowing the rest is worth to any linear filter.
+    """
+    for order, q in ((1, 1e-10), (1, 0.3 * DEG**2), (3, 1e5), (3, 1e11)):
+        known, unknown = (left_by(order, q, start) / DEG for start in ("rest", "unknown"))
+        yield f"order {order}, q {q:.0e}", f"rest {known:.5f}, unknown {unknown:.5f}, ratio {unknown / known:.2f}", True
+
+
+PARTS: dict[str, Callable[[int, Sequence[str]], Iterator[Row]]] = {
+    "starts": starts,
+    "faults": faults,
+    "slow": slow,
+    "rest": rest,
+}
 
 
 def main() -> int:

@@ -11,12 +11,12 @@ from testbed.fusion.analysis.even import EvenDesign, most_even
 from testbed.fusion.analysis.optimum import Optimum, optimum
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
 from testbed.fusion.kernels.covariance import COUNTS, EVERY, PRESENT, settling_kernel
-from testbed.fusion.model import build_model
+from testbed.fusion.model import TIME_UNIT, build_model
 from testbed.fusion.model_filter import initial_state
 from testbed.units import DEG, Frequency, Range
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
     from testbed.parts import Part
@@ -85,16 +85,17 @@ class SteadyState(BlockFilter):
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
         best = _design(belief, sample_rate_hz, parameters)
-        self.model, *others = (
+        q, self._granted = _of_those_left(belief, sample_rate_hz, parameters, best)
+        *others, self.model = (
             build_model(
                 belief,
                 sample_rate_hz,
                 order=best.order,
-                q=q,
+                q=one,
                 coloured=parameters.coloured,
                 start=parameters.start,
             )
-            for q in (best.q, *_of_those_left(belief, sample_rate_hz, parameters, best))
+            for one in q
         )
         self._Q = np.array([one.Q for one in (*others, self.model)])
         n, n_sensor = len(self.model.F), len(self.model.H)
@@ -113,7 +114,7 @@ class SteadyState(BlockFilter):
         self._run = settling_kernel(n, n_sensor, self.model.n_slow)
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
-        model, memory = self.model, (self._cycle, self._progress, self._last)
+        model, memory = self.model, (self._cycle, self._progress, self._last, self._granted)
         self._run(self._x, self._P, model.F, self._Q, model.H, model.R, Z, *memory, out)
 
 
@@ -134,12 +135,27 @@ def _of_those_left(
     sample_rate_hz: Mapping[str, float],
     parameters: SteadyStateParameters,
     best: Optimum | EvenDesign,
-) -> Iterator[float]:
-    """Yield the signal noise for every set of sensors but the whole, bit i of its number for sensor i; that of the
-    whole where none of the set sees a constant rate and no filter settles.
+) -> tuple[list[float], FloatArray]:
+    r"""Return for every set of sensors, bit i of its number for sensor i, the signal noise and what it grants to the
+    derivatives of the rate, shape (2^n_sensor, order).
+
+    Where none of a set sees a constant rate no filter settles: signal noise of the whole, nothing taken off. Else a
+    sine of amplitude A is believed to be no faster than the filter, which ends at :math:`(q / S)^{1 / 2m}`.
     """
-    sensors = list(sample_rate_hz)
-    for number in range(2 ** len(sensors) - 1):
+    sensors, q = list(sample_rate_hz), []
+    granted = np.full((2 ** len(sensors), best.order), np.inf)
+    for number in range(len(granted) - 1):
         left = {name: sample_rate_hz[name] for i, name in enumerate(sensors) if number >> i & 1}
-        settles = any(belief[name].sees_constant for name in left)
-        yield _design(belief, left, parameters, (best.order,)).q if settles else best.q
+        if not any(belief[name].sees_constant for name in left):
+            q.append(best.q)
+            continue
+        q.append(_design(belief, left, parameters, (best.order,)).q)
+        density = 1.0 / sum(1.0 / _white(belief[name]) for name in left)
+        end = TIME_UNIT * (q[-1] / density) ** (0.5 / best.order)
+        granted[number, 1:] = (parameters.amplitude * end ** np.arange(1, best.order)) ** 2
+    return [*q, best.q], granted
+
+
+def _white(belief: SensorBelief) -> float:
+    """Return the input-referred white noise of a sensor at the middle of its band [rad^2/s]."""
+    return belief.input_noise**2 + (belief.output_noise / belief.largest_gain()) ** 2

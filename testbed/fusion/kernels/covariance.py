@@ -150,16 +150,16 @@ def grow(P, F, Q, reach, work, n, core):  # noqa: PLR0912  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def recall(x, P, most, toward, g, n):  # pragma: no cover
-    """Take off the variance of the rate beyond `most`, by a reading of the rate `toward` that is just so uncertain: a
+def recall(x, P, i, most, toward, g, n):  # pragma: no cover
+    """Take off the variance of state i beyond `most`, by a reading of it `toward` that is just so uncertain: a
     covariance that grew without end would lose its sign at the next reading.
     """
-    spread = P[0, 0]
+    spread = P[i, i]
     if not spread > most:
         return
-    share, off = (spread - most) / spread, x[0] - toward
+    share, off = (spread - most) / spread, x[i] - toward
     for j in range(n):
-        g[j] = P[j, 0] / spread
+        g[j] = P[j, i] / spread
     for j in range(n):
         x[j] -= share * g[j] * off
         for k in range(j + 1):
@@ -486,7 +486,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
                     recall_root(x, P, G, gain, lost, due, n)
                 elif form == JOSEPH:
                     predict(x, P, F, Q, reach, work, moved, n, core)
-                    recall(x, P, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
+                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False
@@ -546,8 +546,8 @@ def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
 
 @functools.lru_cache
 def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, Q, H, R, Z, cycle, progress, last, out), the Kalman filter until its gains have settled, then
-    with those.
+    """Return run(x, P, F, Q, H, R, Z, cycle, progress, last, granted, out), the Kalman filter until its gains have
+    settled, then with those.
 
     `cycle` = (K, C, settled, before): gains (n_step, n, n_sensor), variance of an innovation (n_step, n_sensor) and
     covariance after the readings (n_step, n, n) of each step of the cycle in which the readings repeat, and the gains
@@ -556,12 +556,13 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
     `outside_gate`. A reading that is due and missing ends the settled state: the recursion goes on from its covariance
     with the Q of the sensors that are there, Q (2^n_sensor, n, n), bit i for sensor i. `last` = [rate, its variance,
     variance of its departure], of the last reading: with no sensor at all the rate is not believed to go further.
-    `out` as in `kalman_kernel`.
+    `granted` (2^n_sensor, order) is the variance of the rate's derivatives that is believed of a signal which those
+    sensors could follow. `out` as in `kalman_kernel`.
     """
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q, H_in, R, Z, cycle, progress, last, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q, H_in, R, Z, cycle, progress, last, granted, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
         P, F, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
@@ -590,11 +591,13 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             if progress[MODE] != SETTLED:
                 if progress[STARTED] > 0:
                     grow(P, F, Q[progress[PRESENT]], reach, work, n, core)
-                    recall(x, P, last[1] + last[2], last[0], g, n)
+                    recall(x, P, 0, last[1] + last[2], last[0], g, n)
                 for i in range(n_sensor):
                     e[i] = np.nan
-                    if np.isinf(Z[i, k]):
+                    if np.isinf(Z[i, k]) and progress[PRESENT] >> i & 1:
                         progress[PRESENT] &= ~(1 << i)
+                        for j in range(1, granted.shape[1]):
+                            recall(x, P, j, granted[progress[PRESENT], j], 0.0, g, n)
                     if np.isfinite(Z[i, k]):
                         progress[PRESENT] |= 1 << i
                         e[i], spread = innovation(x, P, H, seen, i, Z[i, k], g, n, core)
@@ -813,7 +816,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
                     recall_root(x, P, G, gain, lost, due, n)
                 elif form == JOSEPH:
                     predict(x, P, F, Q, reach, work, moved, n, core)
-                    recall(x, P, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
+                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False
