@@ -22,7 +22,7 @@ from testbed.allan import allan_deviation, fit_allan
 from testbed.compensation.features import Features
 from testbed.compensation.lssvm import Lssvm, kernel_residuals
 from testbed.compensation.model_only import DriftModel, train
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.compensation.search import evolve, grey_wolf
 from testbed.compensation.training import block_means, gather
 from testbed.drift.leak import find_leaks
@@ -79,7 +79,7 @@ PERIODS = (10.0, 60.0, 600.0, 3600.0, 21_600.0)
 class Cycle:
     """A record with its true drift and noise [rad/s]; drift is all that temperature does, scale factor included."""
 
-    record: Record
+    record: GyroRecord
     drift: np.ndarray
     noise: np.ndarray
 
@@ -105,7 +105,7 @@ def cycle(name: str, seed: int, fog: Fog = FOG) -> Cycle:
     stage = fog.start(1.0, seed, "fog")
     reading = stage.process_in(rate, surroundings)
     clean = fog.model_copy(update={"noise": False}).start(1.0, 0, "fog").process_in(rate, surroundings)
-    return Cycle(Record(reading, stage.temperature, 1.0), clean - EARTH, reading - clean)
+    return Cycle(GyroRecord(reading, stage.temperature, 1.0), clean - EARTH, reading - clean)
 
 
 def other(truth: str) -> Fog:
@@ -174,7 +174,7 @@ def other_truths(seeds: range) -> None:
                 pairs += [judge(model, each) for each in unseen]
             row(f"{truth}, {method}", training, pairs)
         known, unseen = data[0]
-        quiet = [Record(EARTH + known[n].drift, known[n].record.temperature, 1.0) for n in TRAINING["paper, 2"]]
+        quiet = [GyroRecord(EARTH + known[n].drift, known[n].record.temperature, 1.0) for n in TRAINING["paper, 2"]]
         model = train(quiet, method="gradient")
         row(f"{truth}, gradient", "paper, 2, no noise", [judge(model, each) for each in unseen])
 
@@ -183,7 +183,7 @@ def audited(model: DriftModel, seed: int) -> None:
     """Print what the audit says of a model on an unseen cycle."""
     unseen = cycle("slower, holds", 100 * seed + 60)
 
-    def compensate(record: Record) -> np.ndarray:
+    def compensate(record: GyroRecord) -> np.ndarray:
         return model.apply(record).rate
 
     found = find_leaks(compensate, unseen.record, compensate(unseen.record), unseen.drift)
@@ -203,7 +203,7 @@ def noise_and_gain(model: DriftModel, seeds: range) -> None:
     base, t = model.apply(unseen).rate, np.arange(unseen.rate.size)
     for period in PERIODS:
         rate = 0.05 * DEG_H * np.sin(2.0 * np.pi * t / period)
-        moved = model.apply(Record(unseen.rate + rate, unseen.temperature, 1.0)).rate
+        moved = model.apply(GyroRecord(unseen.rate + rate, unseen.temperature, 1.0)).rate
         print(f"gain of an injected rate of period {period:7.0f} s: {(moved - base) @ rate / (rate @ rate):.6f}")
 
 

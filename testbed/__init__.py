@@ -75,7 +75,9 @@ from typing import TYPE_CHECKING, Any
 from testbed._version import __version__
 
 if TYPE_CHECKING:
+    from testbed.campaigns.evaluate import evaluate
     from testbed.chain.runner import run
+    from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
     from testbed.logs import read_log
@@ -96,6 +98,8 @@ __all__ = [
     "__version__",
     "belief_of",
     "estimate",
+    "evaluate",
+    "line_of_sight",
     "list_filters",
     "list_motions",
     "list_presets",
@@ -117,6 +121,8 @@ _LAZY = {
     "UnknownNameError": "testbed.errors",
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
+    "evaluate": "testbed.campaigns.evaluate",
+    "line_of_sight": "testbed.chain.sight",
     "list_filters": "testbed.fusion",
     "list_motions": "testbed.models.motions",
     "list_presets": "testbed.sensors",

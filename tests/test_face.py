@@ -26,6 +26,7 @@ EXAMPLES = [
     "testbed",
     "testbed.allan.curve",
     "testbed.allan.fit",
+    "testbed.campaigns.evaluate",
     "testbed.chain.runner",
     "testbed.errors",
     "testbed.fusion",
@@ -87,6 +88,7 @@ def test_every_public_function_can_be_called_with_every_package_imported(tmp_pat
         "open_run": testbed.open_run(tmp_path / "run"),
         "load_scenario": testbed.load_scenario(path),
         "estimate": testbed.estimate("kalman", readings, sample_rate_hz=rates, belief="eq39"),
+        "evaluate": testbed.evaluate(path, [1]),
         "load_preset": testbed.load_preset("sx300"),
         "belief_of": testbed.belief_of("sx300"),
         "list_filters": testbed.list_filters(),
@@ -158,9 +160,10 @@ def test_the_glossary_defines(term):
     assert re.search(rf"^(?:[\w ]+, )*{term}(?:, [\w ]+)*\n    \S", testbed.__doc__, re.MULTILINE)
 
 
-def test_the_page_for_python_does_what_it_says(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("page", "least"), [("python.md", 15), ("campaigns.md", 6)])
+def test_a_page_for_python_does_what_it_says(page, least, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = Path(testbed.__file__).parents[1] / "docs" / "python.md"
-    result = doctest.testfile(str(page), module_relative=False, optionflags=doctest.ELLIPSIS)
-    assert result.attempted > 15
+    path = Path(testbed.__file__).parents[1] / "docs" / page
+    result = doctest.testfile(str(path), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert result.attempted > least
     assert result.failed == 0

@@ -9,15 +9,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed.chain.pipeline import Chain
+from testbed.runs.outputs import OUTPUTS
 from testbed.runs.size import disk_bytes
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from testbed.scenario.model import Scenario
     from testbed.scenario.step_choice import StepChoice
 
 # Compiled functions are loaded in the first, the second is measured.
-_WARM, _TRIED = 200, 4000
+_WARM, _TRIED = 200, 1000
 # Beside the chain, per byte that is written: compression, metrics and recording, on a core of 2020.
 _SECONDS_PER_BYTE = 4e-8
 # Once per run: recording, report.
@@ -49,13 +52,15 @@ class Forecast:
     step: StepChoice
 
 
-def forecast(scenario: Scenario) -> Forecast:
+def forecast(scenario: Scenario, outputs: Sequence[str] = OUTPUTS) -> Forecast:
     """Play the first fraction of a second of a run, and return what all of it will take.
 
     Parameters
     ----------
     scenario : Scenario
         What would run.
+    outputs : sequence of str, optional
+        What it would write.
 
     Raises
     ------
@@ -70,7 +75,7 @@ def forecast(scenario: Scenario) -> Forecast:
     if tried:
         block = chain.tried(tried)
     spent = (time.process_time() - begin) / max(tried, 1) + chain.untried_seconds
-    disk = disk_bytes(block, chain.rates, samples, scenario.detail)
+    disk = disk_bytes(block, chain.rates, samples, scenario.detail, outputs)
     per_block = _WORKING * disk / samples * min(BLOCK, samples)
     return Forecast(
         samples,

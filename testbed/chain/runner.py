@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import math
-import platform
 from contextlib import ExitStack
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed._version import __version__
 from testbed.chain.interrupt import held_interrupts
 from testbed.chain.pipeline import simulate
+from testbed.chain.sinks import open_sinks
+from testbed.chain.versions import versions
 from testbed.judging.judge import Judge
 from testbed.notebook import Run, open_run
-from testbed.runs.attributes import provenance
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
-from testbed.runs.netcdf import NetcdfStore
+from testbed.runs.outputs import chosen
 from testbed.runs.results import MemoryStore
 from testbed.runs.size import disk_bytes, require_space
 from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from testbed.scenario.model import Scenario
 
     Progress = Callable[[float], None]
-
-_LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "rerun-sdk")
 
 
 def run(
@@ -36,6 +32,7 @@ def run(
     seed: int | None = None,
     out: str | Path | None = None,
     *,
+    outputs: Iterable[str] | None = None,
     block: float | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -48,8 +45,12 @@ def run(
     seed : int, optional
         Instead of the scenario's.
     out : str or Path, optional
-        Run folder to write; then the signals are read from it when they are asked for. Without it they are kept in
-        memory.
+        Run folder to write; then the signals are read from it when they are asked for, and memory does not grow with
+        the duration. Without it they are kept in memory, some 14 MB per simulated second of two sensors and three
+        filters.
+    outputs : iterable of str, optional
+        What to write into that folder, of ``metrics``, ``netcdf``, ``recording``, ``report``; all if not given.
+        Without ``netcdf`` the run has metrics only.
     block : float, optional
         Length of a block [s], 20 000 samples of the base clock if not given; the signals do not depend on it.
     progress : callable, optional
@@ -79,8 +80,11 @@ def run(
     loaded = as_scenario(scenario)
     loaded = loaded if seed is None else loaded.with_seed(seed)
     if out is None:
+        if outputs is not None:
+            msg = "outputs: expected only beside out, the folder that they go to"
+            raise ValueError(msg)
         return _run_in_memory(loaded, block, progress)
-    return _run_to_folder(loaded, Path(out), block, progress)
+    return _run_to_folder(loaded, Path(out), chosen(outputs), block, progress)
 
 
 def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress | None) -> Run:
@@ -94,11 +98,9 @@ def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress |
     return Run.of(memory.groups(), judge.metrics(versions()))
 
 
-def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress: Progress | None) -> Run:
-    # The recording's libraries are heavy and of no use to a run in memory.
-    from testbed.recording import RecordingWriter
-    from testbed.report import write_report
-
+def _run_to_folder(
+    scenario: Scenario, out: Path, outputs: tuple[str, ...], block: float | None, progress: Progress | None
+) -> Run:
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder(out))
         reach = stack.enter_context(failing_as_run_error(str(out)))
@@ -106,45 +108,27 @@ def _run_to_folder(scenario: Scenario, out: Path, block: float | None, progress:
         scenario = scenario.kept_in(folder.path)
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain.rates, chain.step)
-        attributes = provenance(scenario.name, scenario.frame.seed, versions())
-        netcdf = NetcdfStore(folder.path / "run.nc", chain.rates, scenario.frame.duration, attributes)
-        stack.callback(netcdf.close)
-        recording = stack.enter_context(
-            RecordingWriter(
-                folder.path / "recording.rrd",
-                scenario_name=scenario.name,
-                sample_rate_hz=chain.rates["base"],
-                n_time=scenario.n_time,
-                sensor_rates={name: chain.rates[name] for name in scenario.sensors},
-                fusion_names=list(scenario.fusion),
-                model=chain.turntable.model,
-                settle=scenario.frame.settle,
-                detail=scenario.detail,
-            )
-        )
+        sinks = open_sinks(stack, folder.path, scenario, chain, outputs)
         for part in blocks:
             if not part.start:
-                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time, scenario.detail))
+                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time, scenario.detail, outputs))
             reach(part.start / chain.rates["base"])
-            for sink in (netcdf, judge, recording):
+            judge.write(part)
+            for sink in sinks:
                 sink.write(part)
             if progress is not None:
                 progress((part.start + part.n_time) / chain.rates["base"])
             check_interrupt()
-        netcdf.close()
-        recording.close()
+        for sink in sinks:
+            sink.close()
         metrics = judge.metrics(versions())
         write_metrics(folder.path, metrics.to_dict())
         write_scenario(folder.path, scenario.resolved(folder.path), versions())
-        write_report(folder.path)
+        about = {"versions": versions(), "plugins": metrics.plugins, "outputs": list(outputs)}
+        if "report" in outputs:
+            # Drawing is heavy.
+            from testbed.report import write_report
+
+            write_report(folder.path)
         check_interrupt()
-        return open_run(folder.finish({"versions": versions(), "plugins": metrics.plugins}))
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that a result depends on."""
-    return {
-        "testbed": __version__,
-        "python": platform.python_version(),
-        **{name: metadata.version(name) for name in _LIBRARIES},
-    }
+        return open_run(folder.finish(about))

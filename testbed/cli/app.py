@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from testbed._version import __version__
-from testbed.cli.commands import allan, compensate, folder, log, parts, psd, reproduce, scenario
+from testbed.cli.commands import allan, compensate, folder, log, parts, pointing, psd, reproduce, scenario
 from testbed.cli.status import OK
 
 app = typer.Typer(
@@ -25,6 +25,7 @@ app.command()(folder.view)
 app.command()(folder.report)
 app.command()(allan.allan)
 app.command()(psd.psd)
+app.command()(pointing.pointing)
 app.command()(reproduce.reproduce)
 app.add_typer(compensate.app)
 app.add_typer(log.app)

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from testbed.cli.console import ruled
 from testbed.pages.palette import color_of
+from testbed.runs.table import window_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -73,18 +74,6 @@ def budget_words(budget: PointingBudget) -> str:
     )
     half = _number(budget.halved_urad[budget.dominant])
     return f"{shares}; {budget.dominant} dominates, half of it would leave {half} urad"
-
-
-def window_text(key: str) -> str:
-    """Return a window's length [s], as metrics.json names it, in the unit that fits.
-
-    Parameters
-    ----------
-    key : str
-        Such as ``0.001``.
-    """
-    length = float(key)
-    return f"{length:g} s" if length >= 1.0 else f"{1e3 * length:g} ms" if length >= 1e-3 else f"{1e6 * length:g} us"
 
 
 def _number(value: float | None) -> str:

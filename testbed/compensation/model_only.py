@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.signals import FloatArray
 
     Fit = Callable[[training.TrainingRows, int], tuple[Lssvm | Polynomial, float]]
@@ -100,12 +100,12 @@ class DriftModel:
         """
         return CompensatorStage(self, self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz)
 
-    def apply(self, record: Record) -> CompensatedBlock:
+    def apply(self, record: GyroRecord) -> CompensatedBlock:
         """Compensate a whole record, the same bits as in blocks.
 
         Parameters
         ----------
-        record : Record
+        record : GyroRecord
             Readings at any sample rate.
         """
         return self.start(record.sample_rate_hz).process(record.rate, record.temperature)
@@ -190,7 +190,7 @@ class CompensatorStage:
 
 
 def train(
-    cycles: Sequence[Record],
+    cycles: Sequence[GyroRecord],
     *,
     method: str = "gradient",
     features: Features | None = None,
@@ -207,7 +207,7 @@ def train(
 
     Parameters
     ----------
-    cycles : sequence of Record
+    cycles : sequence of GyroRecord
         Training records at one sample rate.
     method : str
         `gradient` (least squares under 1/f noise in powers of T, slope and gradient features), `lssvm` (the paper's

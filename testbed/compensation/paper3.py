@@ -21,7 +21,7 @@ from testbed.compensation.training import gather
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.compensation.training import TrainingRows
     from testbed.signals import FloatArray
 
@@ -111,7 +111,7 @@ class PaperResult:
 
 
 def compensate(
-    record: Record,
+    record: GyroRecord,
     options: PaperOptions | None = None,
     *,
     seed: int = 0,
@@ -125,7 +125,7 @@ def compensate(
 
     Parameters
     ----------
-    record : Record
+    record : GyroRecord
         Readings; training and correction use the same ones.
     options : PaperOptions, optional
         The paper's numbers and our choices.
@@ -168,7 +168,7 @@ def compensate(
     return PaperResult(filtered + signal - drift, drift, filtered, sizes, factor, ratio, search)
 
 
-def _decompose(record: Record, options: PaperOptions, seed: int, threads: int | None) -> FloatArray:
+def _decompose(record: GyroRecord, options: PaperOptions, seed: int, threads: int | None) -> FloatArray:
     from testbed.compensation.ceemdan import ceemdan
 
     return ceemdan(
@@ -192,7 +192,7 @@ def _filter(fast: FloatArray, options: PaperOptions) -> tuple[FloatArray, float,
     return fading_memory(fast, factor, ratio)[0], factor, ratio
 
 
-def _regress(record: Record, signal: FloatArray, options: PaperOptions, seed: int) -> tuple[FloatArray, Best]:
+def _regress(record: GyroRecord, signal: FloatArray, options: PaperOptions, seed: int) -> tuple[FloatArray, Best]:
     """Return the machine's drift at each sample and the search for its parameters."""
     part = type(record)(signal, record.temperature, record.sample_rate_hz)
     rows = gather([part], options.features, block=min(_BLOCK, record.duration / 3.0), most=options.rows)

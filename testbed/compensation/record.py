@@ -57,7 +57,7 @@ def checked_rate(sample_rate_hz: float) -> float:
 
 
 @dataclass(frozen=True)
-class Record:
+class GyroRecord:
     """A thermal record of a gyro, such as one cycle in a chamber.
 
     Parameters

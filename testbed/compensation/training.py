@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from testbed.compensation.features import Features
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.signals import FloatArray
 
 # Rows are means over at least this time [s], and longer for a machine whose cost is cubic.
@@ -70,12 +70,12 @@ class TrainingRows:
     n_play: int
 
 
-def gather(cycles: Sequence[Record], features: Features, *, block: float, most: int | None = None) -> TrainingRows:
+def gather(cycles: Sequence[GyroRecord], features: Features, *, block: float, most: int | None = None) -> TrainingRows:
     """Form rows from cycles: features at full rate, then means over whole blocks.
 
     Parameters
     ----------
-    cycles : sequence of Record
+    cycles : sequence of GyroRecord
         At one sample rate, each long enough for two folds.
     features : Features
         What is formed of the temperature.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.drift.leak import Audit
     from testbed.drift.quality import Quality
     from testbed.signals import FloatArray
@@ -36,13 +36,13 @@ CURVES = {
 _TERMS = ("quantization", "angle_random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
 
 
-def drift_figure(record: Record, compensated: FloatArray, drift: FloatArray | None = None) -> Figure:
+def drift_figure(record: GyroRecord, compensated: FloatArray, drift: FloatArray | None = None) -> Figure:
     """Draw 100 s means of the record, of what was removed, of the true drift and of what is left; the temperature
     below.
 
     Parameters
     ----------
-    record : Record
+    record : GyroRecord
         As it was read.
     compensated : ndarray, shape (n_time,)
         Compensated rate [rad/s].

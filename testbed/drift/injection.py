@@ -18,10 +18,10 @@ from testbed.signals import sample_times
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.signals import ComplexArray, FloatArray
 
-    Compensate = Callable[[Record], FloatArray]
+    Compensate = Callable[[GyroRecord], FloatArray]
 
 PERIODS = (10.0, 20.0, 40.0, 60.0, 100.0, 200.0, 400.0, 600.0, 1000.0, 2000.0, 3600.0, 7200.0, 21600.0)  # s
 # Samples per period below which a sine says nothing about the compensation, and periods per record below which it
@@ -124,14 +124,14 @@ def earth_turns(t: FloatArray, latitude: float = np.pi / 4.0) -> FloatArray:
     return rate
 
 
-def survivor(compensate: Compensate, record: Record, plain: FloatArray, injected: FloatArray) -> FloatArray:
+def survivor(compensate: Compensate, record: GyroRecord, plain: FloatArray, injected: FloatArray) -> FloatArray:
     """Return what comes out of `injected` [rad/s], shape (n_time,): the output with it minus the output without.
 
     Parameters
     ----------
     compensate : callable
         Takes a record, returns the compensated rate [rad/s], shape (n_time,).
-    record : Record
+    record : GyroRecord
         Without the injected rate.
     plain : ndarray, shape (n_time,)
         Its compensated rate [rad/s].

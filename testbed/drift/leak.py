@@ -26,7 +26,7 @@ from testbed.units import DEG_H
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.drift.injection import Compensate, LineGain
     from testbed.drift.quality import Quality
     from testbed.signals import FloatArray
@@ -121,7 +121,7 @@ class Audit:
 
 def find_leaks(
     compensate: Compensate,
-    record: Record,
+    record: GyroRecord,
     plain: FloatArray,
     drift: FloatArray | None = None,
     tell: Callable[[str], None] = lambda _: None,
@@ -133,7 +133,7 @@ def find_leaks(
     compensate : callable
         Takes a record, returns the compensated rate [rad/s], shape (n_time,). A method that trains on the record that
         it corrects trains inside.
-    record : Record
+    record : GyroRecord
         To correct.
     plain : ndarray, shape (n_time,)
         Its compensated rate [rad/s].
@@ -182,7 +182,11 @@ def find_leaks(
 
 
 def _survival(
-    compensate: Compensate, record: Record, plain: FloatArray, periods: tuple[float, ...], tell: Callable[[str], None]
+    compensate: Compensate,
+    record: GyroRecord,
+    plain: FloatArray,
+    periods: tuple[float, ...],
+    tell: Callable[[str], None],
 ) -> tuple[tuple[LineGain, ...], float | None, float | None]:
     """Return what survives of sines, of a step and of Earth-rate steps."""
     t = sample_times(0, record.rate.size, record.sample_rate_hz)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift.columns import OPTIONS, Columns
 from testbed.errors import UnknownNameError
 from testbed.logs.choice import channel_map, time_map
@@ -39,14 +39,14 @@ class ThermalRecord:
     ----------
     name : str
         For titles.
-    record : Record
+    record : GyroRecord
         Rate [rad/s] and temperature [K].
     drift : ndarray, shape (n_time,), or None
         True thermal drift [rad/s], which only a simulation knows.
     """
 
     name: str
-    record: Record
+    record: GyroRecord
     drift: FloatArray | None
 
     @property
@@ -206,8 +206,8 @@ def _planned(table: Table, name: str, column: str, unit: str | None, usual: str,
     return plan(name, channel_map(column=column, unit=chosen, time=time), table, keys)
 
 
-def _record(source: Path, rate: FloatArray, temperature: FloatArray, sample_rate_hz: float) -> Record:
+def _record(source: Path, rate: FloatArray, temperature: FloatArray, sample_rate_hz: float) -> GyroRecord:
     try:
-        return Record(rate=np.asarray(rate), temperature=np.asarray(temperature), sample_rate_hz=sample_rate_hz)
+        return GyroRecord(rate=np.asarray(rate), temperature=np.asarray(temperature), sample_rate_hz=sample_rate_hz)
     except ValueError as error:
         raise refusal(source, str(error)) from error

@@ -28,7 +28,7 @@ from testbed.units import DEG_H
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from testbed.compensation.record import Record
+    from testbed.compensation.record import GyroRecord
     from testbed.drift.columns import Columns
     from testbed.signals import FloatArray
 
@@ -249,7 +249,7 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
 
 
 def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
-    def compensate(record: Record) -> FloatArray:
+    def compensate(record: GyroRecord) -> FloatArray:
         return paper3.compensate(record).rate
 
     compensated = compensate(thermal.record)

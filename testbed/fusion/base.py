@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from copy import copy, deepcopy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -148,6 +149,13 @@ class BlockFilter:
             raise ValueError(msg)
         self.schedule = Schedule(sample_rate_hz)
         self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a filter that goes on from here by itself; compiled functions are shared."""
+        twin = copy(self)
+        for name, value in vars(self).items():
+            setattr(twin, name, value if callable(value) else deepcopy(value, memo))
+        return twin
 
     @abstractmethod
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:

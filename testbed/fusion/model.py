@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 
 from testbed.fusion.belief import check_belief
 from testbed.fusion.coloured import slow_noise
-from testbed.fusion.schedule import common_clock
+from testbed.fusion.schedule import MOST_STEPS, common_clock, long_cycle
 from testbed.fusion.start import (
     REST_STD,
     StartKind,
@@ -85,6 +85,14 @@ class FusionModel:
     def cycle(self) -> int:
         """Number of steps after which the pattern of the readings repeats."""
         return math.lcm(*self.strides)
+
+    def check_cycle(self) -> None:
+        """Raise ValueError if the cycle is too long for a design over it."""
+        if reason := long_cycle(self.strides):
+            msg = (
+                f"sample_rate_hz: expected a cycle of at most {MOST_STEPS} steps, got {list(self.strides)}: {reason}; "
+            )
+            raise ValueError(msg + "`kalman` takes them")
 
     @property
     def due(self) -> NDArray[np.bool_]:

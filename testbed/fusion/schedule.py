@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # A reading beyond this [rad/s] is no rate but a missing reading: its square would overflow.
 LARGEST_RATE = 1e6
+# Steps after which the readings repeat, of what is designed or bounded over that cycle: seconds and 0.5 GB at the most.
+MOST_STEPS = 500
 
 
 def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
@@ -43,6 +45,18 @@ def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int,
             msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
             raise ValueError(msg)
     return fastest, strides
+
+
+def long_cycle(strides: Sequence[int]) -> str:
+    """Return why nothing is designed over the cycle in which readings repeat, "" if it can be.
+
+    Parameters
+    ----------
+    strides : sequence of int
+        Of each sensor on the clock of the fastest.
+    """
+    steps = math.lcm(*strides)
+    return "" if steps <= MOST_STEPS else f"the readings repeat after {steps} steps of the fastest sensor only"
 
 
 class Schedule:

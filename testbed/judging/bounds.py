@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.fusion.analysis.bounds import never_settles, run_bounds, settled_bounds
+from testbed.fusion.schedule import common_clock, long_cycle
 from testbed.metrics.errors import floor_rmse
 from testbed.scenario.beliefs import believed
 
@@ -111,8 +112,8 @@ class Bounds:
         )
 
     def _exact(self) -> tuple[dict[str, SensorBelief] | None, str | None]:
-        if self.reason:
-            return None, self.reason
+        if reason := self.reason or long_cycle(common_clock(self._rates)[1]):
+            return None, reason
         found = {name: believed(sensor) for name, sensor in self._sensors.items()}
         known = {name: one for name, one in found.items() if one is not None and one.output_noise > 0.0}
         missing = [name for name in found if name not in known]

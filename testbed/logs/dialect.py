@@ -144,7 +144,7 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     if options.only is not None:
         content = [(number, text) for number, text in content if re.search(word_pattern(options.only), text)]
     if not content:
-        only = "" if options.only is None else f" with the word {options.only!r}"
+        only = "" if options.only is None else f" with the word {quoted(options.only)}"
         raise refusal(path, f"expected a column of numbers, got no line{only}")
     ornaments = find_ornaments([text for _, text in _tail(content)])
     if ornaments.swaps:
@@ -220,8 +220,9 @@ def fields_of(text: str, separator: str) -> list[str]:
 
 def _lines(path: Path, head: bytes, encoding: str, *, complete: bool) -> list[tuple[int, str]]:
     try:
+        "".encode(encoding)  # refuses what is no encoding of a text, such as zip, which could be a bomb
         text = codecs.getincrementaldecoder(encoding)().decode(head, final=False)
-    except (UnicodeDecodeError, LookupError) as error:
+    except (ValueError, LookupError) as error:
         raise refusal(
             path, f"cannot be read: {shortened(str(error))}; which encoding is it?", key="--encoding"
         ) from error

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted
 from testbed.logs.chain import FileChain
 from testbed.logs.channel import Log, LogChannel, refuse_uneven
 from testbed.logs.clock import ClockScan
@@ -238,8 +238,6 @@ def _contradiction(one: Plan, clock: TimeBase) -> list[str]:
     name = one.table.columns[one.stamps].name
     if clock.agrees_with(one.rate_hz) or not clock.even:
         lost = f", in which {clock.gaps.missing} samples are missing" if clock.gaps.count else ""
-        return [f"the stamps of {name!r}{lost} are not used: --time {name!r} does"] if lost else []
-    remedy = f"give --time {name!r} instead of --rate if they are right"
-    return [
-        f"contradiction: the nominal rate is {one.rate_hz:g} Hz, the stamps of {name!r} say {clock.said()}; {remedy}"
-    ]
+        return [f"the stamps of {quoted(name)}{lost} are not used: --time {quoted(name)} does"] if lost else []
+    said = f"the nominal rate is {one.rate_hz:g} Hz, the stamps of {quoted(name)} say {clock.said()}"
+    return [f"contradiction: {said}; give --time {quoted(name)} instead of --rate if they are right"]

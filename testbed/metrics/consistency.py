@@ -54,7 +54,8 @@ class Whiteness:
         series = np.concatenate([self._last, fresh])
         self.n += fresh.size
         self._products += [series[LAGS - lag : series.size - lag] @ fresh for lag in range(LAGS + 1)]
-        self._last = series[fresh.size :]
+        # A copy: a view would keep the whole block.
+        self._last = series[fresh.size :].copy()
 
     def nis(self) -> float | None:
         """Return the mean normalised innovation squared [-], 1 if the claims hold; None without readings."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.metrics.line_fit import Line, LineFit
+from testbed.metrics.line_fit import Line, LineFit, Waves
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,16 +30,18 @@ class ErrorMetrics:
 
     Parameters
     ----------
-    lines : sequence of float
-        Commanded line frequencies [Hz].
+    lines : sequence of float or Waves
+        Commanded line frequencies [Hz]; as `Waves` they are worked out once for all that share it.
     gaps : bool, optional
         NaN estimates are lost readings: left out and counted as `missing`. Otherwise they leave the result undefined.
     span : tuple of two floats, optional
         From when to when samples come [s]; without it gain and phase have no interval.
     """
 
-    def __init__(self, lines: Sequence[float], *, gaps: bool = False, span: tuple[float, float] | None = None) -> None:
-        self._fit = LineFit(lines, span)
+    def __init__(
+        self, lines: Sequence[float] | Waves, *, gaps: bool = False, span: tuple[float, float] | None = None
+    ) -> None:
+        self._fit = LineFit(lines if isinstance(lines, Waves) else Waves(lines), span)
         self._gaps, self._missing = gaps, 0
         self._n = 0
         self._square = 0.0
@@ -61,8 +63,10 @@ class ErrorMetrics:
         """
         if self._gaps:
             there = ~np.isnan(estimate)
-            self._missing += int(t.size - np.count_nonzero(there))
-            t, estimate, truth = t[there], estimate[there], truth[there]
+            missing = int(t.size - np.count_nonzero(there))
+            self._missing += missing
+            if missing:
+                t, estimate, truth = t[there], estimate[there], truth[there]
         if not t.size:
             return
         error = estimate - truth

@@ -52,6 +52,36 @@ class Line:
         )
 
 
+class Waves:
+    """Cosine and sine of each line at the times of a block, worked out once for all fits that share it.
+
+    Parameters
+    ----------
+    lines : sequence of float
+        Frequencies [Hz].
+    """
+
+    def __init__(self, lines: Sequence[float]) -> None:
+        self.lines = tuple(lines)
+        self._t: FloatArray | None = None
+        self._basis = np.empty((0, 0))
+
+    def at(self, t: FloatArray) -> FloatArray:
+        """Return cos and sin of each line [-], shape (2 n_line, n_time), those of the last call if it was for the same
+        array.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n_time,)
+            Time [s], not changed as long as it is in use.
+        """
+        if t is not self._t:
+            turns = [2.0 * np.pi * line * t for line in self.lines]
+            self._basis = np.array([f(turn) for turn in turns for f in (np.cos, np.sin)])
+            self._t = t
+        return self._basis
+
+
 class LineFit:
     r"""Least-squares fit of lines to an error and to the truth, from sums over 64 parts of the record.
 
@@ -67,8 +97,8 @@ class LineFit:
 
     Parameters
     ----------
-    lines : sequence of float
-        Frequencies [Hz].
+    waves : Waves
+        The lines.
     span : tuple of two floats, optional
         From when to when samples come [s]; without it no interval is known.
 
@@ -77,8 +107,8 @@ class LineFit:
     M. B. Priestley (1981), Spectral Analysis and Time Series, section 6.1.3: harmonic analysis in coloured noise.
     """
 
-    def __init__(self, lines: Sequence[float], span: tuple[float, float] | None = None) -> None:
-        self.lines, self._span = tuple(lines), span
+    def __init__(self, waves: Waves, span: tuple[float, float] | None = None) -> None:
+        self._waves, self.lines, self._span = waves, waves.lines, span
         self._n_parts = 1 if span is None else _PARTS
         n = 2 * len(self.lines)
         self._n = 0
@@ -99,7 +129,7 @@ class LineFit:
         if not self.lines:
             return
         self._n += t.size
-        basis = np.concatenate([f(2.0 * np.pi * line * t)[None] for line in self.lines for f in (np.cos, np.sin)])
+        basis = self._waves.at(t)
         self._with_truth += basis @ truth
         parts = self._part_of(t)
         cuts = [0, *(np.flatnonzero(np.diff(parts)) + 1), t.size]

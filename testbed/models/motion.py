@@ -53,6 +53,11 @@ class Motion(Part):
         """
         return self
 
+    @property
+    def draws(self) -> bool:
+        """Whether `start` uses its generator: another seed is another motion then."""
+        return True
+
     def lines(self) -> tuple[float, ...]:
         """Return the frequencies [Hz] at which gain and phase are reported; empty for motions without lines."""
         return ()

@@ -65,7 +65,8 @@ class Run(RunRecord):
 
 
 def open_run(folder: str | Path) -> Run:
-    """Open a run folder; its signals are read when they are asked for.
+    """Open a run folder; its signals are read when they are asked for. A run without `netcdf` among its outputs has
+    metrics only.
 
     Parameters
     ----------
@@ -83,4 +84,4 @@ def open_run(folder: str | Path) -> Run:
     Traceback (most recent call last):
     testbed.errors.ScenarioError: nowhere: expected a run folder, but nowhere/scenario.yaml, ... is missing
     """
-    return Run.open(folder)
+    return Run.open(folder, signals=False)

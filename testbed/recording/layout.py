@@ -10,6 +10,8 @@ import rerun.blueprint as rrb
 
 from testbed.recording.channel import HEIGHT, WIDTH
 from testbed.recording.stream import TIMELINE
+from testbed.recording.target import ENTITY as TARGET
+from testbed.recording.target import HALF
 from testbed.recording.world import rotor_extent
 
 if TYPE_CHECKING:
@@ -90,6 +92,16 @@ def blueprint(
                 ]
             )
         )
+    if sights := [entity for entity in entities if entity.startswith("/pointing/")]:
+        left.append(_target())
+        right.append(
+            _tabs(
+                [
+                    _plot(f"Pointing error, {span} [µrad]", sights, zoom),
+                    _plot(f"Pointing error from {window[0]:g} s on [µrad]", sights, (window[0], duration)),
+                ]
+            )
+        )
     thermometers = [entity for entity in entities if entity.endswith("/temperature")]
     if thermometers:
         drifts = [entity for entity in entities if entity.endswith("/drift")]
@@ -103,11 +115,11 @@ def blueprint(
         )
     if diagnostics := _diagnostics(entities, sensors, duration):
         right.append(_tabs(diagnostics))
-    shares = {"row_shares": [3, 2]} if channels else {}
+    shares = {"row_shares": [3, 2, 2][: len(left)]} if len(left) > 1 else {}
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(*left, **shares),
-            rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4][: len(right)]),
+            rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4, 4][: len(right)]),
             column_shares=[2, 3],
         ),
         rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed"),
@@ -189,6 +201,11 @@ def _turntable(model: mujoco.MjModel) -> rrb.Spatial3DView:
         line_grid=False,
         background=rrb.Background((26, 30, 36)),
     )
+
+
+def _target() -> rrb.Spatial2DView:
+    bounds = rrb.VisualBounds2D(x_range=[-1.3 * HALF, 1.3 * HALF], y_range=[-1.1 * HALF, 1.35 * HALF])
+    return rrb.Spatial2DView(origin=TARGET, contents=["$origin/**"], name="Beam on the target", visual_bounds=bounds)
 
 
 def _profile(sensor: str) -> rrb.Spatial2DView:

@@ -18,6 +18,7 @@ from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
 from testbed.recording.layout import blueprint
 from testbed.recording.stream import Clock, Recording, Signal
+from testbed.recording.target import Target
 from testbed.recording.world import World
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ class RecordingWriter:
         self._signals: dict[str, Signal] = {}
         self._world = World(self._recording, model, {name: self._colors[f"sensors/{name}"] for name in sensor_rates})
         self._channels: dict[str, Channel] = {}
+        self._target: Target | None = None
         self._moved = False
         self._open = True
 
@@ -127,6 +129,7 @@ class RecordingWriter:
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
+        self._write_sights(block)
         self._write_poses(block)
 
     def close(self) -> None:
@@ -144,6 +147,8 @@ class RecordingWriter:
             signal.finish()
         for channel in self._channels.values():
             channel.finish()
+        if self._target is not None:
+            self._target.finish()
         self._world.finish()
         self._stream.send_blueprint(self._blueprint())
         try:
@@ -225,6 +230,18 @@ class RecordingWriter:
                 gaps=gaps,
             )
         self._signals[entity].write(values)
+
+    def _write_sights(self, block: RunBlock) -> None:
+        if block.pointing and self._target is None:
+            self._target = Target(self._recording, {name: self._colors[f"fusion/{name}"] for name in block.pointing})
+        first = -block.start % self._pose_stride
+        for name, sight in block.pointing.items():
+            key = f"fusion/{name}"
+            self._add(f"/pointing/{name}/residual", 1e6 * sight.residual, 1, f"{name} [µrad]", key)
+            assert self._target is not None
+            residual = sight.residual[first :: self._pose_stride]
+            index = block.start + first + self._pose_stride * np.arange(residual.size)
+            self._target.write(name, index, residual)
 
     def _write_poses(self, block: RunBlock) -> None:
         first = -block.start % self._pose_stride

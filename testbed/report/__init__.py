@@ -11,11 +11,12 @@ from testbed.pages.template import render
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
+from testbed.report.pointing import inside_rows, sight_budget_figure, sight_curves_figure, sight_rows
 from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
-from testbed.runs.table import error_unit
+from testbed.runs.table import error_unit, metric_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,7 +117,15 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         digest=digest,
         bands=band_rows(metrics.budget, digest) if metrics.budget else [],
         line_optima=line_optima(metrics),
+        sight_rows=sight_rows(metrics),
+        sight_metrics=[row.metric for row in metrics.expectations if _of_pointing(row.metric)],
+        inside_rows=inside_rows,
+        metric_text=metric_text,
     )
+
+
+def _of_pointing(metric: str) -> bool:
+    return "_urad" in metric or metric in {"delay_us", "outage", "mean_loss_db"}
 
 
 def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
@@ -136,7 +145,11 @@ def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
 
 def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
     colors, unit = series_colors(list(metrics.sensors), list(metrics.fusion)), error_unit(metrics)
-    drawn = {"rates": rates_figure(digest, colors, unit)}
+    drawn = {}
+    if metrics.pointing:
+        drawn["sight_budget"] = sight_budget_figure(metrics.pointing)
+        drawn["sight_curves"] = sight_curves_figure(metrics.pointing, colors)
+    drawn["rates"] = rates_figure(digest, colors, unit)
     if digest.filter_errors:
         drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 
 from testbed.errors import Problem, RunError, ScenarioError
 from testbed.runs.atomic import put, sync_tree, write_text
-from testbed.runs.leftovers import beside, heal
+from testbed.runs.leftovers import alone_in, beside, heal
 from testbed.runs.manifest import MANIFEST, read_manifest, strangers, write_manifest
 
 if TYPE_CHECKING:
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from typing import Self
 
 
-ESSENTIAL = ("scenario.yaml", "run.nc", "metrics.json")
+SIGNALS = "run.nc"
+ESSENTIAL = ("scenario.yaml", SIGNALS, "metrics.json")
 
 
 class RunFolder:
@@ -50,7 +51,9 @@ class RunFolder:
         try:
             self._place = Path(os.path.realpath(self.target))
             heal(self._place)
-            if found := in_the_way(self._place):
+            with alone_in(self._place.parent):
+                found = in_the_way(self._place)
+            if found:
                 raise ScenarioError([Problem(f"{found}: choose another --out, or move it away", file=str(self.target))])
             self._place.parent.mkdir(parents=True, exist_ok=True)
             self.path = self._stack.enter_context(beside(self._place, folder=True)) / "run"
@@ -79,10 +82,12 @@ class RunFolder:
         """
         write_manifest(self.path, about)
         sync_tree(self.path)
-        found = in_the_way(self._place)
-        if found:
-            self._keep(found)
-        put(self.path, self._place)
+        # Alone, or the folder that another run puts there meanwhile is half the one and half the other.
+        with alone_in(self._place.parent):
+            found = in_the_way(self._place)
+            if found:
+                self._keep(found)
+            put(self.path, self._place)
         return self.target
 
     def _keep(self, found: str) -> NoReturn:

@@ -30,7 +30,7 @@ def beside(place: Path, *, folder: bool = False) -> Iterator[Path]:
     folder : bool, optional
         Make a folder.
     """
-    with _alone_in(place.parent) as alone:
+    with alone_in(place.parent) as alone:
         if alone:
             _sweep(place)
         path = place.with_name(f".{place.name}.{secrets.token_hex(4)}.partial")
@@ -44,12 +44,31 @@ def beside(place: Path, *, folder: bool = False) -> Iterator[Path]:
             os.close(lock)
 
 
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[bool]:
+    """Wait until no other process makes, sweeps or exchanges anything in `folder`; False where that cannot be had.
+
+    Not to be asked for again by the one that has it.
+
+    Parameters
+    ----------
+    folder : Path
+        With the places.
+    """
+    lock = _lock(folder, wait=True)
+    try:
+        yield lock is not None
+    finally:
+        if lock is not None:
+            os.close(lock)
+
+
 def heal(place: Path) -> None:
     """Finish what a process left that died, where folders cannot be exchanged, while it replaced `place`."""
     place = Path(os.path.realpath(place))
     if place.exists():
         return
-    with _alone_in(place.parent) as alone:
+    with alone_in(place.parent) as alone:
         if alone:
             _sweep(place)
 
@@ -66,17 +85,6 @@ def _sweep(place: Path) -> None:
             if (entry / "old").is_dir() and (entry / "run").is_dir() and not place.exists():
                 (entry / "run").rename(place)
             _remove(entry)
-            os.close(lock)
-
-
-@contextlib.contextmanager
-def _alone_in(folder: Path) -> Iterator[bool]:
-    """Wait until no other process makes or sweeps anything in `folder`; False where that cannot be had."""
-    lock = _lock(folder, wait=True)
-    try:
-        yield lock is not None
-    finally:
-        if lock is not None:
             os.close(lock)
 
 

@@ -11,11 +11,12 @@ import numpy as np
 from testbed.errors import Problem, ScenarioError
 from testbed.runs.attributes import unit_of
 from testbed.runs.block import columns
-from testbed.runs.folder import ESSENTIAL
+from testbed.runs.folder import ESSENTIAL, SIGNALS
 from testbed.runs.leftovers import heal
 from testbed.runs.metrics import RunMetrics, read_metrics
+from testbed.runs.outputs import writes
 from testbed.runs.reading import read_groups
-from testbed.runs.signals import Signals, kept
+from testbed.runs.signals import NONE, Signals, kept
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,13 +62,15 @@ class RunRecord:
         )
 
     @classmethod
-    def open(cls, folder: str | Path) -> Self:
+    def open(cls, folder: str | Path, *, signals: bool = True) -> Self:
         """Open a run folder; its signals are read when they are asked for.
 
         Parameters
         ----------
         folder : str or Path
             A run folder.
+        signals : bool, optional
+            Refuse a run that was told to keep none; otherwise its groups are empty.
 
         Raises
         ------
@@ -77,10 +80,15 @@ class RunRecord:
         path = Path(folder).absolute()
         heal(path)
         missing = [name for name in ESSENTIAL if not (path / name).is_file()]
+        if missing == [SIGNALS] and not writes(path, "netcdf"):
+            if not signals:
+                return cls.of(dict.fromkeys(("commanded", "truth"), NONE), read_metrics(path / "metrics.json"), path)
+            problem = "holds no signals: it was run without netcdf among its outputs; run it again with it"
+            raise ScenarioError([Problem(problem, file=str(folder))])
         if missing:
             problem = f"expected a run folder, but {', '.join(str(Path(folder) / name) for name in missing)} is missing"
             raise ScenarioError([Problem(problem, file=str(folder))])
-        metrics, groups = read_metrics(path / "metrics.json"), read_groups(path / "run.nc")
+        metrics, groups = read_metrics(path / "metrics.json"), read_groups(path / SIGNALS)
         for group in ("commanded", "truth"):
             if group not in groups:
                 raise ScenarioError([Problem("expected this group, got none", group, str(path / "run.nc"))])

@@ -129,3 +129,7 @@ def kept(arrays: Mapping[str, FloatArray], units: Mapping[str, str], sample_rate
         n_time,
         _Kept({"time": np.arange(n_time) / sample_rate_hz, **arrays}),
     )
+
+
+# What a run has that was told to keep no signals.
+NONE = Signals({}, 0.0, 0, _Kept({}))

@@ -10,14 +10,15 @@ import numpy as np
 from testbed.errors import Problem, ScenarioError
 from testbed.runs.attributes import is_precise
 from testbed.runs.block import columns
+from testbed.runs.outputs import OUTPUTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from testbed.runs.block import RunBlock
 
-# What compression leaves of a signal, those that stay at one value aside.
+# What is left of a diagnostic, those that stay at one value aside; a rate is stored as it is.
 _KEPT = 0.5
 # The recording: bytes of a sample with its time, two samples in each of 4000 bins.
 _SAMPLE, _BINNED = 16, 8000
@@ -26,7 +27,13 @@ _OTHER_FILES = 600_000
 _SPARE = 1.05
 
 
-def disk_bytes(block: RunBlock, rates: Mapping[str, float], n_time: int, detail: tuple[float, float]) -> int:
+def disk_bytes(
+    block: RunBlock,
+    rates: Mapping[str, float],
+    n_time: int,
+    detail: tuple[float, float],
+    outputs: Sequence[str] = OUTPUTS,
+) -> int:
     """Return about how large the folder of a run will be [byte].
 
     Parameters
@@ -39,17 +46,21 @@ def disk_bytes(block: RunBlock, rates: Mapping[str, float], n_time: int, detail:
         Base samples of the run.
     detail : tuple of float
         From when to when the recording holds every sample [s].
+    outputs : sequence of str, optional
+        What is written, of `OUTPUTS`.
     """
     stored = recorded = 0.0
     for group, name, _, rate, values in columns(block, rates):
         n = n_time * rate / rates["base"]
         if not values.size or np.ptp(values) != 0.0:
-            stored += (8 if is_precise(name) else 4) * n
+            stored += 8 * n if is_precise(name) else _KEPT * 4 * n
         recorded += min(n, _BINNED)
         if name == "rate":
             lines = 2 if group.startswith("fusion/") else 1  # the error beside the estimate
             recorded += lines * min(n, (detail[1] - detail[0]) * rate)
-    return round(_KEPT * stored + _SAMPLE * recorded) + _OTHER_FILES
+    stored *= "netcdf" in outputs
+    recorded *= "recording" in outputs
+    return round(stored + _SAMPLE * recorded) + _OTHER_FILES
 
 
 def require_space(place: Path, needed: int) -> None:

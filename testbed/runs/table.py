@@ -52,6 +52,33 @@ def number(value: float | None) -> str:
     return NOTHING if value is None else f"{value:.4g}"
 
 
+def window_text(key: str) -> str:
+    """Return a window's length [s], as metrics.json names it, in the unit that fits.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``0.001``.
+    """
+    length = float(key)
+    if length >= 1.0:
+        return f"{length:g} s"
+    return f"{1e3 * length:g} ms" if length >= 1e-3 else f"{1e6 * length:g} us"
+
+
+def metric_text(metric: str) -> str:
+    """Return the name of a metric of pointing in words, such as `RPE over 100 ms`.
+
+    Parameters
+    ----------
+    metric : str
+        Such as ``rpe_urad.0.1`` or ``residual_rms_urad``.
+    """
+    name, _, window = metric.partition(".")
+    words = name.removesuffix("_urad").removesuffix("_us").replace("_", " ")
+    return f"{words.upper()} over {window_text(window)}" if window else words
+
+
 def rate_text(value: float | None, unit: tuple[str, float]) -> str:
     """Return a rate with its unit, or that it is below what the arithmetic resolves.
 

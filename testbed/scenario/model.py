@@ -184,6 +184,11 @@ class Scenario:
         """Seed of the random streams of the truth."""
         return self.frame.seed if self.frame.truth_seed is None else self.frame.truth_seed
 
+    @property
+    def random_truth(self) -> bool:
+        """Whether another `truth_seed` is another truth."""
+        return bool(self.turntable.floor.bands) or any(motion.draws for _, motion in self.motion)
+
     def floor(self, duration: float | None = None) -> FloorMotion:
         """Return how the floor of the run moves.
 

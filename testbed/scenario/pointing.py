@@ -26,6 +26,8 @@ POINTING_METRICS = (
     "outage",
     "mean_loss_db",
 )
+# Base samples in a window.
+_FEWEST = 10
 WINDOW_METRICS = ("rpe_urad", "mpe_urad", "pde_urad", "pre_urad")
 
 
@@ -135,8 +137,10 @@ def _check_windows(scenario: Scenario, pointing: PointingParameters, document: D
         whole = window.length + (window.separation or 0.0)
         if whole > judged:
             document.find(place, f"expected windows within the {judged:g} s after settle, got {whole:g} s")
-        if round(window.length * scenario.base_rate_hz) < 2:
-            document.find(place, f"expected at least two samples of the base clock, got {window.length:g} s")
+        # Sums over fewer are no integrals: the variance of m samples is off by 1/m^2.
+        if round(window.length * scenario.base_rate_hz) < _FEWEST:
+            least = 1e6 * _FEWEST / scenario.base_rate_hz
+            document.find(place, f"expected at least {_FEWEST} base samples, {least:g} us, got {window.length:g} s")
         if window.key in seen:
             document.find(place, f"there is another window of {window.key} s: metrics are named by the length")
         seen.add(window.key)

@@ -71,6 +71,21 @@ class ExposedStage(SensorStage, Protocol):
 
 
 @runtime_checkable
+class SplitStage(SensorStage, Protocol):
+    """An instrument whose noise comes behind all that the truth goes through: its readings of a block are
+    ``finish(clean(true_rate, surroundings))``, and `clean` is the same for every seed where it is `separable`.
+    """
+
+    separable: bool
+
+    def clean(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return what it would read of a block without noise, word and losses [rad/s], at the clock of the readings."""
+
+    def finish(self, clean: FloatArray) -> FloatArray:
+        """Return the readings [rad/s] that become of what `clean` gave."""
+
+
+@runtime_checkable
 class ProfiledStage(SensorStage, Protocol):
     """An instrument with a fluid inside, whose velocity profile can be looked at."""
 

@@ -172,6 +172,8 @@ class FogStage:
     thermal bias as its axis feels it [rad/s], at the input's clock.
     """
 
+    separable = True
+
     def __init__(self, fog: Fog, input_rate_hz: float, seed: int, name: str) -> None:
         self._fog, self._ratio = fog, rate_ratio(input_rate_hz, fog.sample_rate)
         self._thermal = fog.thermal.start(input_rate_hz)
@@ -189,6 +191,10 @@ class FogStage:
 
     def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
+        return self.finish(self.clean(true_rate, surroundings))
+
+    def clean(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return what it would read without noise and range [rad/s]; see `SplitStage`."""
         fog, ambient = self._fog, surroundings.temperature
         if ambient is None:
             ambient = np.full(true_rate.size, fog.thermal.reference_temperature)
@@ -196,9 +202,11 @@ class FogStage:
         self.temperature = self._round(self._decimator.process(self._thermometer.process(ambient)))
         heat = self._thermal.coil_temperature - fog.thermal.reference_temperature
         gain = 1.0 + fog.scale_factor_error + fog.scale_factor_temperature * heat
-        readings = self._mean.process(self._low_pass.process(gain * true_rate + self.drift))
-        readings += self._noise.process(readings.size)
-        return np.clip(readings, -fog.range, fog.range)
+        return self._mean.process(self._low_pass.process(gain * true_rate + self.drift))
+
+    def finish(self, clean: FloatArray) -> FloatArray:
+        """Return the readings that become of it [rad/s]; see `SplitStage`."""
+        return np.clip(clean + self._noise.process(clean.size), -self._fog.range, self._fog.range)
 
     def _round(self, temperature: FloatArray) -> FloatArray:
         if not self._fog.noise:

@@ -95,8 +95,8 @@ class GyroErrors(Part):
         """Whether cross rates or accelerations matter; see `Sensor.exposed`."""
         return any(self.cross_axis) or any(self.g_sensitivity)
 
-    def distort(self, true_rate: FloatArray, surroundings: Surroundings, turn_on: float) -> FloatArray:
-        """Return what the element senses.
+    def distort(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return what the element senses, b_0 apart.
 
         Parameters
         ----------
@@ -104,13 +104,11 @@ class GyroErrors(Part):
             True rate about the sensing axis [rad/s].
         surroundings : Surroundings
             Over the same samples.
-        turn_on : float
-            Bias of this run b_0 [rad/s].
 
         Returns
         -------
         ndarray, shape (n_time,)
-            Rate with all constant errors [rad/s].
+            Rate with all errors but that bias, which a constant low-pass lets come later [rad/s].
         """
         sensed, cross, force = true_rate, surroundings.cross_rate, surroundings.specific_force
         heat = 0.0 if surroundings.temperature is None else surroundings.temperature - self.reference_temperature
@@ -121,7 +119,7 @@ class GyroErrors(Part):
             sensed = gain * sensed + 0.5 * self.scale_factor_asymmetry * np.abs(sensed)
         along = (0.0, 0.0, _GRAVITY) if force is None else force.T
         leaning = sum(g * f for g, f in zip(self.g_sensitivity, along, strict=True) if g)
-        shifted: FloatArray = sensed + (turn_on + self.bias_temperature * heat + leaning)
+        shifted: FloatArray = sensed + (self.bias_temperature * heat + leaning)
         return shifted
 
     def weights(self, ratio: int) -> FloatArray:

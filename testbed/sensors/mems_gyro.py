@@ -243,10 +243,13 @@ class MemsGyroStage:
         def stream(term: str) -> np.random.Generator:
             return random_stream(seed, name, term)
 
-        self._turn_on = gyro.turn_on_bias * stream("turn_on_bias").standard_normal() if gyro.noise else 0.0
         numerator, denominator = gyro.transfer_function
+        # A constant passes the low-pass, settled as it is, and weights and ages by its gain at zero alone.
+        self._turn_on = gyro.turn_on_bias * stream("turn_on_bias").standard_normal() if gyro.noise else 0.0
+        self._turn_on *= numerator[-1] / denominator[-1]
         # Weights and ages work on the samples of the run, so their noise has to be there too.
         self._early = gyro.fir is not None or gyro.jitter > 0.0
+        self.separable = not (self._early and gyro.noise)
         passed, rate_hz = Rational(numerator, denominator), input_rate_hz if self._early else gyro.sample_rate
         self._noise = NoiseStage(gyro.sampled_terms(passed, rate_hz, seed, name) if gyro.noise else {})
         self._ramp = Ramp(gyro.rate_ramp if gyro.noise else 0.0, input_rate_hz)
@@ -264,7 +267,11 @@ class MemsGyroStage:
 
     def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]; NaN where one is lost."""
-        sensed = self._gyro.distort(true_rate, surroundings, self._turn_on)
+        return self.finish(self.clean(true_rate, surroundings))
+
+    def clean(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return what it would read without noise, dead band, word and losses [rad/s]; see `SplitStage`."""
+        sensed = self._gyro.distort(true_rate, surroundings)
         if self._gyro.rate_ramp:
             sensed = sensed + self._ramp.process(true_rate.size)
         if sensed.size and not self._settled:
@@ -274,7 +281,11 @@ class MemsGyroStage:
         filtered = self._low_pass.process(sensed)
         if self._early:
             filtered += self._noise.process(filtered.size)
-        taken = self._decimator.process(self._fir.process(filtered))
+        return self._decimator.process(self._fir.process(filtered))
+
+    def finish(self, clean: FloatArray) -> FloatArray:
+        """Return the readings that become of it [rad/s]; see `SplitStage`."""
+        taken = clean + self._turn_on
         if not self._early:
             taken = taken + self._noise.process(taken.size)
         readings = self._converter.process(np.where(np.abs(taken) < self._gyro.dead_band, 0.0, taken))

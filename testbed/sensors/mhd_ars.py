@@ -12,7 +12,7 @@ from testbed.models.mhd_channel.channel import MhdChannel
 from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
-from testbed.sensors.base import Converter, Decimator, Sensor, rate_ratio, rounding_psd
+from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
 from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
@@ -183,6 +183,7 @@ class MhdArsStage:
         # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
         self._early = sensor.saturation is not None
         johnson = _johnson_terms(sensor, input_rate_hz if self._early else sensor.sample_rate, seed, name)
+        self.separable = not (self._early and johnson and sensor.noise)
         self._johnson = NoiseStage(johnson if sensor.noise else {})
         self._noise = NoiseStage(sensor.noise_terms(sensor.sample_rate, seed, name) if sensor.noise else {})
         self._converter = Converter(
@@ -191,6 +192,10 @@ class MhdArsStage:
 
     def process(self, true_rate: FloatArray) -> FloatArray:
         """Return the readings [rad/s] that fall into a block of the true rate [rad/s]."""
+        return self.finish(self.clean(true_rate, Surroundings()))
+
+    def clean(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
+        """Return what it would read without noise and word [rad/s]; see `SplitStage`."""
         if true_rate.size and np.isnan(self._first):
             self._first = float(true_rate[0])
         # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
@@ -201,9 +206,11 @@ class MhdArsStage:
             signal = signal + self._johnson.process(signal.size)
         for stage in self._behind:
             signal = stage.process(signal)
-        taken = self._decimator.process(signal)
-        if not self._early:
-            taken = taken + self._johnson.process(taken.size)
+        return self._decimator.process(signal)
+
+    def finish(self, clean: FloatArray) -> FloatArray:
+        """Return the readings that become of it [rad/s]; see `SplitStage`."""
+        taken = clean if self._early else clean + self._johnson.process(clean.size)
         return self._converter.process(taken + self._noise.process(taken.size))
 
     def profile(self) -> FloatArray:

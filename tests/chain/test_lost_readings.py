@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import testbed
-from testbed.chain.pipeline import _sense
+from testbed.chain.instruments import _sense
 from testbed.cli.terminal import print_metrics
 from testbed.cli.understood import print_scenario
 from testbed.errors import ScenarioError

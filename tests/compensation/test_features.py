@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from testbed.compensation.features import Features, Scaling
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 
 ALL = Features(plays=(3.0, 10.0))
 
@@ -155,7 +155,7 @@ def test_bad_features_are_refused(change):
 )
 def test_a_bad_record_is_refused(rate, temperature, sample_rate_hz, name):
     with pytest.raises(ValueError, match=name):
-        Record(rate, temperature, sample_rate_hz)
+        GyroRecord(rate, temperature, sample_rate_hz)
 
 
 def test_nan_temperature_is_refused_and_leaves_the_stage_as_it_was():

@@ -10,7 +10,7 @@ import pytest
 
 from testbed.allan import allan_deviation, fit_allan
 from testbed.compensation.model_only import METHODS, DriftModel, train
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.compensation.training import block_means
 from tests.compensation.thermal_record import DEG_H, UNSEEN, cycle
 
@@ -99,7 +99,7 @@ def test_compensation_leaves_the_noise_coefficients_alone(models, cycles):
 def test_the_drift_does_not_depend_on_the_rate(models, method, rng):
     unseen = cycle("mixed_down", 4).record
     rates = unseen.rate[:6000], DEG_H * rng.normal(size=6000)
-    drifts = [models[method].apply(Record(rate, unseen.temperature[:6000], 1.0)).drift for rate in rates]
+    drifts = [models[method].apply(GyroRecord(rate, unseen.temperature[:6000], 1.0)).drift for rate in rates]
     assert np.array_equal(*drifts)
 
 
@@ -114,7 +114,7 @@ def test_a_true_rate_passes_whole(models, method):
     base = models[method].apply(unseen)
     for period in (10.0, 60.0, 600.0, 3600.0, 21_600.0):
         rate = 5.0 * DEG_H * np.sin(2.0 * np.pi * t / period)
-        moved = models[method].apply(Record(unseen.rate + rate, unseen.temperature, 1.0))
+        moved = models[method].apply(GyroRecord(unseen.rate + rate, unseen.temperature, 1.0))
         assert np.array_equal(moved.drift, base.drift)
         gain = (moved.rate - base.rate) @ rate / (rate @ rate)
         assert gain == pytest.approx(1.0, abs=1e-9)
@@ -124,7 +124,7 @@ def test_a_true_rate_passes_whole(models, method):
 @pytest.mark.parametrize("method", METHODS)
 def test_any_division_into_blocks_gives_the_same_bits(models, method, rng):
     unseen = cycle("mixed_down", 4).record
-    part = Record(unseen.rate[:9000], unseen.temperature[:9000], 1.0)
+    part = GyroRecord(unseen.rate[:9000], unseen.temperature[:9000], 1.0)
     whole, stage = models[method].apply(part), models[method].start()
     cuts = [0, 1, 2, 3, *np.sort(rng.integers(3, 9000, 12)), 9000]
     blocks = [stage.process(part.rate[a:b], part.temperature[a:b]) for a, b in itertools.pairwise(cuts)]
@@ -135,7 +135,7 @@ def test_any_division_into_blocks_gives_the_same_bits(models, method, rng):
 @pytest.mark.property
 def test_the_future_does_not_change_the_past(models):
     unseen = cycle("up", 4).record
-    other = Record(unseen.rate, np.r_[unseen.temperature[:30_000], unseen.temperature[30_000:] + 9.0], 1.0)
+    other = GyroRecord(unseen.rate, np.r_[unseen.temperature[:30_000], unseen.temperature[30_000:] + 9.0], 1.0)
     past, changed = (models["gradient"].apply(record).rate[:30_001] for record in (unseen, other))
     assert np.array_equal(past[:30_000], changed[:30_000])
     # Latency: the very sample that is new has moved already.
@@ -145,9 +145,9 @@ def test_the_future_does_not_change_the_past(models):
 def test_a_frozen_model_does_not_learn(models):
     model = models["lssvm"]
     before, unseen = json.dumps(model.to_dict()), cycle("up", 4).record
-    part = Record(unseen.rate[:5000], unseen.temperature[:5000], 1.0)
+    part = GyroRecord(unseen.rate[:5000], unseen.temperature[:5000], 1.0)
     first = model.apply(part)
-    model.apply(Record(part.rate + 1.0, part.temperature - 30.0, 1.0))
+    model.apply(GyroRecord(part.rate + 1.0, part.temperature - 30.0, 1.0))
     assert json.dumps(model.to_dict()) == before
     assert np.array_equal(model.apply(part).drift, first.drift)
 
@@ -157,7 +157,7 @@ def test_a_model_survives_json(models, method):
     model = models[method]
     again = DriftModel.from_dict(json.loads(json.dumps(model.to_dict())))
     unseen = cycle("up", 4).record
-    part = Record(unseen.rate[:3000], unseen.temperature[:3000], 1.0)
+    part = GyroRecord(unseen.rate[:3000], unseen.temperature[:3000], 1.0)
     assert np.array_equal(again.apply(part).rate, model.apply(part).rate)
     assert again.to_dict() == model.to_dict()
 
@@ -173,7 +173,7 @@ def test_a_document_that_is_no_model_is_refused(models, change):
 
 def test_earth_rate_stays_and_is_told(models, cycles):
     """The mean over the training rows is no drift: a model trained at another latitude subtracts the same."""
-    elsewhere = [Record(each.record.rate + 3.0 * DEG_H, each.record.temperature, 1.0) for each in cycles]
+    elsewhere = [GyroRecord(each.record.rate + 3.0 * DEG_H, each.record.temperature, 1.0) for each in cycles]
     other, unseen = train(elsewhere), cycle("up", 4).record
     shift = other.mean_rate - models["gradient"].mean_rate
     assert shift == pytest.approx(3.0 * DEG_H, rel=1e-9)
@@ -187,9 +187,9 @@ def test_extrapolation_is_flagged(models):
     """Twice the trained slope, and 10 K beyond the trained range; the trained cycles themselves are inside."""
     seen = cycle("up", 5).record
     assert not models["gradient"].apply(seen).extrapolated.any()
-    fast = Record(seen.rate[::2], seen.temperature[::2], 1.0)
+    fast = GyroRecord(seen.rate[::2], seen.temperature[::2], 1.0)
     assert models["gradient"].apply(fast).extrapolated.mean() > 0.5
-    hot = Record(seen.rate, seen.temperature + 10.0, 1.0)
+    hot = GyroRecord(seen.rate, seen.temperature + 10.0, 1.0)
     flagged = models["gradient"].apply(hot).extrapolated
     assert flagged[seen.temperature > seen.temperature.max() - 4.0].all()
     assert not flagged[:7200].any()
@@ -197,7 +197,7 @@ def test_extrapolation_is_flagged(models):
 
 def test_the_machine_far_outside_falls_back_to_its_bias_and_says_so(models):
     seen = cycle("up", 5).record
-    far = models["lssvm"].apply(Record(seen.rate[:500], seen.temperature[:500] + 1e4, 1.0))
+    far = models["lssvm"].apply(GyroRecord(seen.rate[:500], seen.temperature[:500] + 1e4, 1.0))
     assert far.drift == pytest.approx(models["lssvm"].machine.bias, abs=1e-15)
     assert far.extrapolated.all()
 

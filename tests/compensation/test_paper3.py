@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from testbed.compensation.fading import fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.paper3 import PaperOptions, compensate
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.compensation.training import block_means
 from tests.compensation.thermal_record import DEG_H, cycle
 
@@ -63,7 +63,7 @@ def test_training_on_the_record_removes_true_rate_and_so_fails_any_audit(unseen)
     """
     t = np.arange(unseen.record.rate.size)
     rate = 0.05 * DEG_H * np.sin(2.0 * np.pi * t / 21_600.0)
-    moved = Record(unseen.record.rate + rate, unseen.record.temperature, 1.0)
+    moved = GyroRecord(unseen.record.rate + rate, unseen.record.temperature, 1.0)
     gain = ((run(moved, SLOPE).rate - run(unseen.record, SLOPE).rate) @ rate) / (rate @ rate)
     assert gain < 0.1
 

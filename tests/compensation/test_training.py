@@ -9,14 +9,14 @@ from scipy.linalg import block_diag, solve_triangular
 from testbed.compensation.features import Features
 from testbed.compensation.flicker import noise_root, whiten
 from testbed.compensation.polynomial import Polynomial, likeliest_ridge, penalised, ridge_residuals
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.compensation.training import block_means, fit_coloured, fit_polynomial, fit_process, gather
 from tests.compensation.thermal_record import WHITE, flicker
 
 
 def record(rng, n=30_000, sample_rate_hz=1.0, rate=1e-7):
     T = 293.15 + 20.0 * np.sin(np.arange(n) / 3000.0)
-    return Record(rate + 1e-9 * rng.normal(size=n), T, sample_rate_hz)
+    return GyroRecord(rate + 1e-9 * rng.normal(size=n), T, sample_rate_hz)
 
 
 @pytest.mark.oracle
@@ -67,7 +67,7 @@ def test_features_that_determine_nothing_get_no_weight(rng, noise):
     """A chamber that never moved: only rounding is left of every feature, and the drift is zero; also of a rate that
     never moved.
     """
-    still = Record(1e-7 + noise * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
+    still = GyroRecord(1e-7 + noise * rng.normal(size=30_000), np.full(30_000, 300.0), 1.0)
     rows = gather([still], Features(plays=(3.0,)), block=7200.0)
     for fit in (fit_polynomial, fit_coloured, fit_process):
         assert np.allclose(fit(rows)[0].weights, 0.0, rtol=0.0, atol=1e-15)
@@ -126,7 +126,7 @@ def test_the_process_has_a_prior_for_hysteresis_alone(rng):
     """
     features = Features(lags=(), plays=(3.0, 10.0))
     still = record(rng)
-    moved = Record(still.rate + 1e-9 * (still.temperature - 293.15), still.temperature, 1.0)
+    moved = GyroRecord(still.rate + 1e-9 * (still.temperature - 293.15), still.temperature, 1.0)
     rows = gather([moved, moved], features, block=7200.0)
     U, v = whiten(rows.Z, rows.y, rows.cycles, 1.7)
     group = np.array([-1, -1, *(int(name.startswith("play")) for name in features.names)])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 
 DEG_H = np.pi / 180.0 / 3600.0
 # N = 7.8034e-4 deg/sqrt(h) and B = 1.5323e-2 deg/h of paper 3, in deg/h at 1 Hz.
@@ -32,7 +32,7 @@ UNSEEN = ("up", "down", "slow_up", "mixed_down")
 class Cycle:
     """A record [SI] with its true drift and noise [rad/s]."""
 
-    record: Record
+    record: GyroRecord
     drift: np.ndarray
     noise: np.ndarray
 
@@ -88,5 +88,5 @@ def cycle(name, seed, *, earth=10.0, noise=1.0):
     drift, case = true_drift(programme(PROGRAMMES[name]))
     own = noise * (WHITE * rng.normal(size=drift.size) + flicker(drift.size, rng))
     reading = np.round(case / 0.0625) * 0.0625 + 273.15
-    record = Record(DEG_H * (earth + drift + own), reading, 1.0)
+    record = GyroRecord(DEG_H * (earth + drift + own), reading, 1.0)
     return Cycle(record, DEG_H * drift, DEG_H * own)

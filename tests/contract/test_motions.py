@@ -80,3 +80,12 @@ def test_every_number_of_a_motion_changes_it(name, context):
             assert not np.array_equal(
                 model.model_validate(changed, context=context).start(2.0, np.random.default_rng(1))(t), base
             ), key
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_motion_that_does_not_draw_is_the_same_for_every_seed(name, context):
+    """Many seeds share one truth where `draws` says so; where it says that it draws, it does."""
+    motion = MODELS[name].model_validate(EXAMPLES[name], context=context)
+    t = np.linspace(0.0, 2.0, 1001)
+    one, other = (motion.start(2.0, np.random.default_rng(seed))(t) for seed in (1, 2))
+    assert np.array_equal(one, other) != motion.draws or name == "own_motion"

@@ -255,6 +255,6 @@ def test_every_key_changes_the_output(name, key):
 def test_the_check_of_keys_sees_an_ignored_one(monkeypatch):
     from testbed.sensors.gyro_errors import GyroErrors
 
-    monkeypatch.setattr(GyroErrors, "distort", lambda self, rate, around, turn_on: rate)
+    monkeypatch.setattr(GyroErrors, "distort", lambda self, rate, around: rate)
     with pytest.raises(AssertionError):
         test_every_key_changes_the_output("crs03", "g_sensitivity")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift import injection
 from testbed.signals import sample_times
 
@@ -14,7 +14,7 @@ SIZE = 2.4e-7  # rad/s
 
 
 def record(rate):
-    return Record(rate=rate, temperature=np.full(rate.size, 293.0), sample_rate_hz=FS)
+    return GyroRecord(rate=rate, temperature=np.full(rate.size, 293.0), sample_rate_hz=FS)
 
 
 def test_usable_periods_have_four_samples_each_and_two_periods_in_the_record():

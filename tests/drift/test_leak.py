@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift.injection import PERIODS
 from testbed.drift.leak import DRIFT_PERIOD, FAST_SINE, SLOW_SINE, STEP, find_leaks
 from testbed.drift.quality import smoothed
@@ -29,7 +29,7 @@ def cycle():
     t = sample_times(0, N_TIME, FS)
     temperature = 293.0 + 30.0 * np.sin(2.0 * np.pi * t / t[-1])
     drift = 0.1 * DEG_H * ((temperature - 293.0) / 30.0) ** 3 + 0.1 * DEG_H * np.cos(2.0 * np.pi * t / t[-1])
-    return Record(rate=drift + NOISE.sample(N_TIME, FS, 5), temperature=temperature, sample_rate_hz=FS), drift
+    return GyroRecord(rate=drift + NOISE.sample(N_TIME, FS, 5), temperature=temperature, sample_rate_hz=FS), drift
 
 
 def test_removing_the_true_drift_passes_with_every_rate_intact(cycle):

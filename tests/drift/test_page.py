@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, curves, write_audit
@@ -27,7 +27,7 @@ def record():
     t = sample_times(0, N_TIME, FS)
     temperature = 293.0 + 30.0 * np.sin(2.0 * np.pi * t / t[-1])
     drift = 0.1 * DEG_H * ((temperature - 293.0) / 30.0) ** 3
-    return ThermalRecord(NAME, Record(drift + NOISE.sample(N_TIME, FS, 7), temperature, FS), drift)
+    return ThermalRecord(NAME, GyroRecord(drift + NOISE.sample(N_TIME, FS, 7), temperature, FS), drift)
 
 
 def audited(compensate, *, truth=True, **more):

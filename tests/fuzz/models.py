@@ -10,7 +10,7 @@ import numpy as np
 
 from testbed.compensation.document import sealed
 from testbed.compensation.model_only import train
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 
 HOSTILE = (
     *(None, True, False, "", "x", "1.0", "nan", [], {}, [1.0], {"a": 1}, [[]], 0, -1, 1, 1.5, 10**400, -(10**30)),
@@ -18,7 +18,7 @@ HOSTILE = (
 )
 # Of a drift that a gyro may have [rad/s]; what a model is tried on.
 MOST_DRIFT = 0.1
-TRIED = Record(np.full(50, 1e-5), np.linspace(280.0, 310.0, 50), 1.0)
+TRIED = GyroRecord(np.full(50, 1e-5), np.linspace(280.0, 310.0, 50), 1.0)
 
 
 @functools.cache
@@ -26,7 +26,7 @@ def documents():
     """Return the documents of two models, trained on two short cycles, by their method."""
     rng = np.random.default_rng(3)
     heat = 293.0 + 20.0 * np.sin(np.arange(30_000) / 3000.0)
-    cycles = [Record(1e-6 * (heat - 293.0) + 1e-7 * rng.standard_normal(heat.size), heat, 1.0) for _ in range(2)]
+    cycles = [GyroRecord(1e-6 * (heat - 293.0) + 1e-7 * rng.standard_normal(heat.size), heat, 1.0) for _ in range(2)]
     return {
         method: sealed({**train(cycles, method=method).to_dict(), "trained_on": {"a" * 64: "up"}})
         for method in ("gradient", "lssvm")

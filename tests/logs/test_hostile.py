@@ -193,3 +193,15 @@ def test_memory_does_not_grow_with_a_text_that_is_inspected(tmp_path):
     large = run(path, "log", "inspect")
     assert (small[0], large[0]) == (0, 0)
     assert large[3] < small[3] + 30 * 2**20
+
+
+@pytest.mark.parametrize(
+    "encoding", ["rot13", "zip", "bz2", "quopri", "hex", "base64", "undefined", "no such", "x\0y", "\ud800", "u" * 300]
+)
+def test_what_is_no_encoding_of_a_text_is_refused(tmp_path, encoding):
+    path = tmp_path / "log.csv"
+    path.write_text("t [us],w [deg/s]\n" + "".join(f"{500 * k},{k % 7}\n" for k in range(100)))
+    with pytest.raises(ScenarioError, match="which encoding is it") as caught:
+        read_log(path, map={"encoding": encoding, "channels": {"w": {"column": 2, "unit": "deg/s"}}})
+    (problem,) = caught.value.problems
+    assert len(problem.message) < 200

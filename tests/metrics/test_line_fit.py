@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from testbed.metrics.line_fit import LineFit
+from testbed.metrics.line_fit import LineFit, Waves
 
 FS, LENGTH, SEEDS = 200.0, 10.0, 600
 T = np.arange(round(FS * LENGTH)) / FS
@@ -30,7 +30,7 @@ def flicker(rng):
 
 
 def fit(error, truth, lines, t=T, span=(0.0, LENGTH), n_block=None):
-    found = LineFit(lines, span)
+    found = LineFit(Waves(lines), span)
     for start in range(0, t.size, n_block or t.size):
         part = slice(start, start + (n_block or t.size))
         found.add(t[part], error[part], truth[part])

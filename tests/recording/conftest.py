@@ -105,6 +105,7 @@ class SyntheticRun:
                 profiles={"mhd_ars": (self.heights, self.profiles[pose])},
                 temperatures={},
                 drifts={},
+                pointing={},
             )
 
     def writer(self, path: Path, **changes: Any) -> RecordingWriter:

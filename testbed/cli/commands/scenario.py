@@ -22,6 +22,10 @@ def run(
     block: Annotated[
         str | None, typer.Option(metavar="TIME", help="Length of a block; the result does not depend on it.")
     ] = None,
+    outputs: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
     plugin: PluginModules = None,
     allow_outside: AllowOutside = False,
@@ -32,15 +36,19 @@ def run(
     from testbed.cli.check_page import size_words, warnings
     from testbed.cli.terminal import print_metrics
     from testbed.logs.options import quantity
+    from testbed.runs.outputs import chosen
     from testbed.scenario.loader import load_scenario
 
+    wanted = chosen(None if outputs is None else [name.strip() for name in outputs.split(",")])
+    if view and "recording" not in wanted:
+        raise ScenarioError([Problem("--view shows the recording: add recording", "outputs")])
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     output.warn(warnings(loaded))
-    output.note(f"{loaded.name}: {size_words(forecast(loaded))}")
+    output.note(f"{loaded.name}: {size_words(forecast(loaded, wanted))}")
     target = out or Path("runs") / loaded.name
     with output.progress(loaded.name, loaded.frame.duration) as tick:
-        result = run_scenario(loaded, out=target, seed=seed, block=length, progress=tick)
+        result = run_scenario(loaded, out=target, seed=seed, outputs=wanted, block=length, progress=tick)
     document = {**result.metrics.to_dict(), "written": str(target)}
     output.show(document, lambda: print_metrics(result.metrics, target))
     if view:

@@ -215,7 +215,13 @@ def period_map(model: FusionModel, Q: FloatArray) -> CycleMap:
         F, H, R.
     Q : ndarray, shape (n_q, n_state, n_state)
         Covariance of a step of each filter [rad^2/s^2].
+
+    Raises
+    ------
+    ValueError
+        If the period is too long.
     """
+    model.check_cycle()
     whole = None
     for used in model.due:
         h = model.H[used]

@@ -4,6 +4,7 @@ together.
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,10 +40,11 @@ def noise_variance(paths: Paths, model: FusionModel, slow: int, fast: int) -> Fl
     Raises
     ------
     ValueError
-        If the error does not settle: the loop around the slow sensor is unstable.
+        If the error does not settle: the loop around the slow sensor is unstable; or the cycle is too long.
     """
+    model.check_cycle()
     M, W, read = _joint_steps(paths, model, slow, fast)
-    around = np.linalg.multi_dot([*M[::-1], np.eye(len(read))])
+    around = functools.reduce(lambda done, step: step @ done, M)
     if np.max(np.abs(np.linalg.eigvals(around))) >= 1.0:
         msg = "crossover: expected one well inside the band of the slow sensor, got an unstable loop; give a lower one"
         raise ValueError(msg)

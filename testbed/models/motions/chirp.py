@@ -55,6 +55,11 @@ class Chirp(Motion):
             raise ValueError(msg)
         return self
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return False
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         f0, f1, T = self.start_frequency, self.stop_frequency, self.sweep_time or duration

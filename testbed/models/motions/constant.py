@@ -26,6 +26,11 @@ class Constant(Motion):
 
     rate: Rate
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return False
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
 

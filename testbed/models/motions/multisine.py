@@ -57,6 +57,11 @@ class Multisine(Motion):
             raise ValueError(msg)
         return self
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return self.phases == "random"
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         w = 2.0 * np.pi * np.array(self.frequencies)

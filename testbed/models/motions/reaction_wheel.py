@@ -143,6 +143,11 @@ class ReactionWheel(Motion):
             total -= mode.gain * ratio**2 / (1.0 - ratio**2 + 2j * mode.damping * ratio)
         return total
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return any(one.phase is None for one in self.harmonics)
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         drawn = rng.uniform(0.0, 2.0 * np.pi, len(self.harmonics))

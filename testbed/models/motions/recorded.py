@@ -109,6 +109,11 @@ class Recorded(Motion):
         units.parse(f"1 {self.rate.unit}", "rad/s", example="deg/s")
         return self
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return False
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]; ScenarioError if the record is shorter than `duration`."""
         t, rate = self._read()

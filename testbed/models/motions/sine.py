@@ -54,6 +54,11 @@ class Sine(Motion):
             raise ValueError(msg)
         return self
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return False
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]."""
         w = 2.0 * np.pi * self.frequency

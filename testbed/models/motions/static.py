@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 class Static(Motion):
     """Standstill: the commanded rate is zero."""
 
+    @property
+    def draws(self) -> bool:
+        """Whether it is random; see `Motion.draws`."""
+        return False
+
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s], zero, as a function of time [s]."""
         return np.zeros_like

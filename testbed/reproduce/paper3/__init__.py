@@ -16,7 +16,7 @@ from testbed.compensation import paper3
 from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
-from testbed.compensation.record import Record
+from testbed.compensation.record import GyroRecord
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.quality import smoothed
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
 
-    Compensate = Callable[[Record], FloatArray]
+    Compensate = Callable[[GyroRecord], FloatArray]
 
 EARTH = SPEED * np.sin(np.pi / 4.0)  # rad/s, about the vertical at 45 degrees
 _HOLD = {"hold": "2 h"}
@@ -100,7 +100,7 @@ class DriftProtocol:
 
 
 @dataclass(frozen=True)
-class Case:
+class Contender:
     """A row of the table.
 
     Parameters
@@ -135,10 +135,10 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
     stage = fog.start(sample_rate_hz, seed, "fog")
     oven = Surroundings(temperature=profile.at(0, n_time, sample_rate_hz))
     rate = stage.process_in(np.full(n_time, EARTH), oven)
-    return ThermalRecord(f"{programme}, seed {seed}", Record(rate, stage.temperature, sample_rate_hz), stage.drift)
+    return ThermalRecord(f"{programme}, seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
-def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
+def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
     """Yield the rows of the table for one seed, each trained when it is its turn.
 
     Parameters
@@ -151,14 +151,14 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
     fs = protocol.sample_rate_hz
     one = [cycle("up first", 1000 + seed, fs).record]
     two = [*one, cycle("down first", 2000 + seed, fs).record]
-    yield Case(ORIGINAL, "-", lambda record: record.rate)
-    yield Case(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
-    yield Case("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
+    yield Contender(ORIGINAL, "-", lambda record: record.rate)
+    yield Contender(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
+    yield Contender("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
     ):
-        yield Case(name, "this record", _paper(options, seed))
+        yield Contender(name, "this record", _paper(options, seed))
     for name, method, cycles in (
         ("polynomial", "polynomial", two),
         ("LSSVM", "lssvm", two),
@@ -166,7 +166,7 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Case]:
         ("gradient", "gradient", two),
     ):
         model = train(cycles, method=method)
-        yield Case(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
+        yield Contender(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
 
 
 def _paper(options: paper3.PaperOptions, seed: int) -> Compensate:
@@ -219,14 +219,14 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     yield from _printed(rows, found, seeds)
 
 
-def _title(case: Case) -> str:
+def _title(case: Contender) -> str:
     return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
 _PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
 
 
-def _audited(case: Case, thermal: ThermalRecord) -> tuple[Audited, float]:
+def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:
     begin = time.perf_counter()
     plain = case.compensate(thermal.record)
     seconds = time.perf_counter() - begin

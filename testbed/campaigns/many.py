@@ -1,0 +1,117 @@
+"""A sensor and a filter under many seeds: what does not depend on the seed is computed once."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import TYPE_CHECKING
+
+from testbed.chain.instruments import start_filter, surroundings
+from testbed.fusion import FILTERS
+from testbed.sensors import SENSORS
+from testbed.sensors.base import ExposedStage, SplitStage, Surroundings
+from testbed.sensors.checked import CheckedSensor
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from testbed.fusion.base import EstimateBlock
+    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.scenario.model import Scenario
+    from testbed.sensors.base import SensorStage
+    from testbed.signals import FloatArray
+
+
+class ManySensors:
+    """One instrument under many seeds over the same truth.
+
+    Clean readings are worked out once, and each seed adds its noise, rounds and loses readings by itself; all of it is
+    done for each seed where noise comes before something that is not linear, and for the instrument of a plug-in.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What it belongs to.
+    name : str
+        Of the instrument.
+    seeds : sequence of int
+        Of the noise.
+    """
+
+    def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int]) -> None:
+        self._scenario, self._name, base = scenario, name, scenario.base_rate_hz
+        sensor = scenario.sensors[name]
+        self._stages = {seed: sensor.start(base, seed, name) for seed in seeds}
+        self._watch = None
+        if scenario.sensor_types[name] not in SENSORS:
+            self._watch = {seed: CheckedSensor(name, round(base / sensor.sample_rate)) for seed in seeds}
+        # Of stages that split, the first also does for all what comes before the noise.
+        self._split: dict[int, SplitStage] = {}
+        if self._watch is None:
+            self._split = {
+                seed: stage for seed, stage in self._stages.items() if isinstance(stage, SplitStage) and stage.separable
+            }
+
+    def take(self, truth: TruthBlock) -> None:
+        """Take the next block of the truth."""
+        self._rate, self._around = truth.sensor_rate[self._name], surroundings(self._scenario, self._name, truth)
+        if self._split:
+            self._clean = next(iter(self._split.values())).clean(self._rate, self._around)
+
+    def readings(self, seeds: Sequence[int]) -> list[FloatArray]:
+        """Return the readings of that block [rad/s] under some of the seeds, each once.
+
+        Parameters
+        ----------
+        seeds : sequence of int
+            Some of those given at the start.
+        """
+        return [self._reading(seed) for seed in seeds]
+
+    def _reading(self, seed: int) -> FloatArray:
+        if self._split:
+            return self._split[seed].finish(self._clean)
+        stage = self._stages[seed]
+        if self._watch is None:
+            return _whole(stage, self._rate, self._around)
+        return self._watch[seed].sense(lambda rate: (_whole(stage, rate, self._around), None), self._rate)[0]
+
+
+def _whole(stage: SensorStage, rate: FloatArray, around: Surroundings) -> FloatArray:
+    return stage.process_in(rate, around) if isinstance(stage, ExposedStage) else stage.process(rate)
+
+
+class ManyFilters:
+    """One filter under many seeds.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What it belongs to.
+    name : str
+        Of the filter.
+    seeds : sequence of int
+        Of the noise.
+    """
+
+    def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int]) -> None:
+        spec = scenario.fusion[name]
+        first = start_filter(scenario, name, spec)
+        # Some design their gains before they start; a plug-in may not be made to be copied.
+        self._stages = {
+            seed: deepcopy(first) if spec.type in FILTERS else start_filter(scenario, name, spec) for seed in seeds
+        }
+
+    def process(self, readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[EstimateBlock]:
+        """Return the estimates over a block under some of the seeds.
+
+        Parameters
+        ----------
+        readings : mapping of str to sequence of ndarray
+            By sensor, the readings under each of these seeds [rad/s].
+        seeds : sequence of int
+            Some of those given at the start.
+        """
+        return [
+            self._stages[seed].process({name: values[j] for name, values in readings.items()})
+            for j, seed in enumerate(seeds)
+        ]

@@ -1,0 +1,76 @@
+"""The figures that pointing promises, on the satellite over 40 s behind `wideband`; `pytest -s` prints them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import testbed
+
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "satellite_microvibration.yaml"
+POINTING = {
+    "tracker": {"bandwidth": "10 Hz"},
+    "mirror": {"bandwidth": "1 kHz", "latency": "500 us"},
+    "windows": ["1 ms", "100 ms", {"length": "200 ms", "separation": "1 s"}],
+}
+LED = {**POINTING, "mirror": {**POINTING["mirror"], "lead": "on"}}
+LATE = {**POINTING, "mirror": {**LED["mirror"], "latency": "600 us", "assumed_latency": "500 us"}}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    scenario = testbed.load_scenario(SCENARIO).with_(
+        duration="40 s",
+        settle="12 s",
+        turntable={"engine": "modal"},
+        fusion={"wideband": {"belief": "identified"}},
+        pointing=POINTING,
+        expect=None,
+    )
+    out = tmp_path_factory.mktemp("satellite") / "run"
+    testbed.run(scenario, out=out)
+    return out
+
+
+@pytest.mark.slow
+def test_the_satellite_has_the_residuals_that_are_promised(folder):
+    plain = testbed.open_run(folder).metrics.pointing["wideband"]
+    led = testbed.line_of_sight(folder, LED)["wideband"]
+    for name, one in (("plain", plain), ("with lead", led)):
+        print(name, one.residual_rms_urad, one.knowledge_rms_urad, one.tracker_only_rms_urad, one.delay_us)
+    assert_allclose(plain.residual_rms_urad, 0.67, atol=0.03)
+    assert led.residual_rms_urad <= 0.16
+    assert_allclose(plain.tracker_only_rms_urad, 4.0, atol=0.1)
+    assert plain.knowledge_rms_urad <= 0.016
+    assert led.knowledge_rms_urad <= 0.016
+    # Mirror and latency are late by the same motion, so that their roots of squares do not add up.
+    assert_allclose(plain.budget.quadrature_urad, 0.514, atol=0.03)
+    assert_allclose(sum(plain.budget.shares.values()), 1.0, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_rpe_over_a_millisecond_is_an_independent_windowed_variance(folder):
+    """Numpy's own variance in every window of 20 samples, and by the spectrum."""
+    run = testbed.open_run(folder)
+    error = 1e6 * run.pointing["wideband"].residual[240_000:]
+    by_hand = np.sqrt(np.mean(np.lib.stride_tricks.sliding_window_view(error, 20).var(axis=1)))
+    found = run.metrics.pointing["wideband"]
+    print("RPE over 1 ms", found.rpe_urad["0.001"], by_hand)
+    assert_allclose(found.rpe_urad["0.001"], by_hand, rtol=0.05)
+    # Samples and spectrum within 2 %: MPE and PDE for windows under 1/100 of 28 s.
+    spectral = found["spectral"]
+    for kind in ("rpe_urad", "mpe_urad", "pde_urad"):
+        for window, value in spectral[kind].items():
+            if value is not None:
+                assert_allclose(value, found[kind][window], rtol=0.02, err_msg=f"{kind} {window}")
+
+
+@pytest.mark.slow
+def test_a_hundred_microseconds_are_found(folder):
+    """Planted beside what the lead knows; without any, the delay is what the filter and the lead's own order leave."""
+    found = testbed.line_of_sight(folder, LATE)["wideband"].delay_us
+    print("planted 100 us, found", found)
+    assert_allclose(found, 100.0, atol=20.0)

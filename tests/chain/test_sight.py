@@ -1,0 +1,93 @@
+"""The line of sight of a finished run, and the command that prints it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import testbed
+from testbed.cli.app import app
+from tests.chain.test_pointing import aimed
+from tests.recording.test_writer import read
+
+OTHER = "tracker: {bandwidth: 5 Hz}\nmirror: {bandwidth: 1 kHz, latency: 0 s}\nwindows: [10 ms]\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("aim") / "run"
+    testbed.run(aimed(duration="1 s", settle="0.5 s"), out=out)
+    return out
+
+
+def test_a_finished_run_has_the_line_of_sight_that_it_had(folder):
+    """The same stage over the stored signals: rates are stored in double precision."""
+    own = testbed.open_run(folder).metrics.pointing["kalman"].to_dict()
+    found = testbed.line_of_sight(folder)["kalman"].to_dict()
+    for key in ("residual_rms_urad", "knowledge_rms_urad", "tracker_only_rms_urad", "delay_us", "peak_urad"):
+        assert_allclose(found[key], own[key], rtol=1e-9)
+    assert_allclose(list(found["budget"]["shares"].values()), list(own["budget"]["shares"].values()), atol=1e-9)
+    assert found["budget"]["knowledge"].keys() == own["budget"]["knowledge"].keys()
+
+
+def test_another_pointing_is_played_on_the_same_run(folder, tmp_path):
+    file = tmp_path / "aim.yaml"
+    file.write_text(OTHER)
+    found = CliRunner().invoke(app, ["pointing", str(folder), "--pointing", str(file), "--json"])
+    assert found.exit_code == 0, found.output
+    sight = json.loads(found.stdout)["pointing"]["kalman"]
+    own = testbed.open_run(folder).metrics.pointing["kalman"]
+    assert sight["residual_rms_urad"] < own.residual_rms_urad
+    assert set(sight["rpe_urad"]) == {"0.01"}
+    table = CliRunner().invoke(app, ["pointing", str(folder)])
+    assert table.exit_code == 0
+    assert "latency dominates" in table.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("mirror: {bandwidht: 1 kHz}\n", "mirror.bandwidht"),
+        ("pointing:\n  feed_forward: [wideband]\n", "pointing.feed_forward.0"),
+        ("windows: [2 s]\n", "windows.0"),
+    ],
+)
+def test_what_does_not_fit_the_run_is_refused_at_its_place(folder, tmp_path, text, key):
+    file = tmp_path / "aim.yaml"
+    file.write_text(text)
+    with pytest.raises(testbed.ScenarioError) as caught:
+        testbed.line_of_sight(folder, file)
+    (problem,) = caught.value.problems
+    assert problem.key.endswith(key)
+    assert problem.file == str(file)
+
+
+def test_a_run_without_pointing_asks_for_one(tmp_path):
+    out = tmp_path / "run"
+    testbed.run(aimed(duration="0.2 s", settle="0.1 s", pointing=None), out=out)
+    with pytest.raises(testbed.ScenarioError, match="--pointing"):
+        testbed.line_of_sight(out)
+    assert testbed.line_of_sight(out, {"mirror": {"bandwidth": "2 kHz"}})["kalman"].residual_rms_urad > 0.0
+
+
+def test_the_report_has_the_design_page(folder):
+    """Requirement, budget and curves: the number of the table is that of metrics.json."""
+    page = (folder / "report.html").read_text()
+    own = testbed.open_run(folder).metrics.pointing["kalman"]
+    assert '<table id="sights">' in page
+    assert f'value="{own.residual_rms_urad}"' in page
+    assert "latency dominates" in page
+    assert {"sight_budget", "sight_curves"} <= set(testbed.open_run(folder).plot())
+
+
+def test_the_recording_has_residual_and_beam_spot(folder):
+    """The spot is the residual in urad, every 400th base sample."""
+    found = read(folder / "recording.rrd")
+    entities = {entity for entity, _ in found}
+    assert {"/pointing/kalman/residual", "/pointing/target/kalman"} <= entities
+    _, spots = found["/pointing/target/kalman", "Points2D:positions"]
+    residual = testbed.open_run(folder).pointing["kalman"].residual[::400]
+    assert_allclose(spots.reshape(-1, 2)[:, 0], 1e6 * residual, rtol=1e-6, atol=1e-9)
