@@ -1,6 +1,7 @@
 """Speed and memory of reading recordings: CPU seconds, and the largest resident size of the process.
 
-`python benchmarks/bench_logs.py` prints a row for each; `--long` adds a text of 1 GB, inspected in blocks.
+`python benchmarks/bench_logs.py` prints a row for each; `--long` adds a text of 1 GB: inspected, and the
+Allan deviation and density of means of 100 samples.
 """
 
 from __future__ import annotations
@@ -94,35 +95,46 @@ def measure(name: str, write, **said: object) -> None:
         )
 
 
-def inspect_long() -> None:
-    """Inspect a text of 1 GB: the memory must not grow with it."""
+def long_text() -> None:
+    """Inspect a text of 1 GB, and take the Allan deviation and density of its means: memory must not grow with it."""
+    commands = (["log", "inspect"], ["allan", "--average", "100"], ["psd", "--average", "100"])
     with tempfile.TemporaryDirectory() as folder:
         for n in (5_000_000, 55_000_000):
             path = Path(folder) / "log.csv"
             text(path, n)
-            begin = time.monotonic()
-            child = os.posix_spawn(
-                sys.executable, [sys.executable, "-m", "testbed", "log", "inspect", "--json", str(path)], os.environ
-            )
-            _, status, usage = os.wait4(child, 0)
-            size = path.stat().st_size / 1e6
-            spent = usage.ru_utime + usage.ru_stime
-            words = f"{spent:.1f} CPU s, {time.monotonic() - begin:.1f} s, {usage.ru_maxrss / 1024:.0f} MB resident"
-            print(f"inspect {size:.0f} MB: status {status}, {words}")
+            for command in commands:
+                spent, peak, wall, status = run([*command, str(path)], folder)
+                size = path.stat().st_size / 1e6
+                words = f"{spent:.1f} CPU s, {wall:.1f} s, {peak:.0f} MB resident"
+                print(f"{' '.join(command)}, {size:.0f} MB: status {status}, {words}", flush=True)
+
+
+def run(words: list[str], folder: str) -> tuple[float, float, float, int]:
+    """Run a command; return CPU seconds, peak size [MB], seconds and status."""
+    begin = time.monotonic()
+    script = f"import os, sys; os.chdir({folder!r}); from testbed.cli import main; sys.argv[0] = 'testbed'; main()"
+    with Path(folder, "words.txt").open("wb") as stream:
+        actions = [(os.POSIX_SPAWN_DUP2, stream.fileno(), 1)]
+        arguments = [sys.executable, "-c", script, *words]
+        child = os.posix_spawn(sys.executable, arguments, os.environ, file_actions=actions)
+        _, status, usage = os.wait4(child, 0)
+    spent = usage.ru_utime + usage.ru_stime
+    return spent, usage.ru_maxrss / 1024, time.monotonic() - begin, os.waitstatus_to_exitcode(status)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--long", action="store_true")
+    parser.add_argument("--long", action="store_true", help="also a text of 1 GB")
     wanted = parser.parse_args()
+    if wanted.long:
+        # First: what `wait` reports of a child begins with the size of this process.
+        long_text()
     measure("npy", npy, column=["column 2"], unit="deg/s", time="column 1")
     measure("parquet", parquet)
     measure("hdf5", hdf5)
     measure("mdf4", mdf, column=["w"])
     measure("tdms", tdms)
     measure("text", text)
-    if wanted.long:
-        inspect_long()
     print(f"this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 

@@ -76,6 +76,7 @@ from testbed._version import __version__
 
 if TYPE_CHECKING:
     from testbed.campaigns.evaluate import evaluate
+    from testbed.campaigns.sweep import open_sweep, sweep
     from testbed.chain.runner import run
     from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
@@ -107,8 +108,10 @@ __all__ = [
     "load_preset",
     "load_scenario",
     "open_run",
+    "open_sweep",
     "read_log",
     "run",
+    "sweep",
 ]
 
 # No name of a package below: once that is imported, it would hide the function.
@@ -123,6 +126,8 @@ _LAZY = {
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
     "line_of_sight": "testbed.chain.sight",
+    "open_sweep": "testbed.campaigns.sweep",
+    "sweep": "testbed.campaigns.sweep",
     "list_filters": "testbed.fusion",
     "list_motions": "testbed.models.motions",
     "list_presets": "testbed.sensors",

@@ -41,7 +41,8 @@ ROOMS = {
         *("scenario", "models", "sensors", "fusion", "pointing", "runs"),
         *("judging", "report", "recording", "notebook"),
     },
-    "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs"},
+    "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs", "pages"},
+    "design": {"scenario", "sensors", "fusion", "models", "pointing", "pages"},
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.

@@ -27,7 +27,9 @@ EXAMPLES = [
     "testbed.allan.curve",
     "testbed.allan.fit",
     "testbed.campaigns.evaluate",
+    "testbed.campaigns.sweep",
     "testbed.chain.runner",
+    "testbed.chain.sight",
     "testbed.errors",
     "testbed.fusion",
     "testbed.fusion.belief",
@@ -97,6 +99,10 @@ def test_every_public_function_can_be_called_with_every_package_imported(tmp_pat
         "list_sensors": testbed.list_sensors(),
         "read_log": testbed.read_log(log),
     }
+    called["line_of_sight"] = testbed.line_of_sight(tmp_path / "run", {"tracker": {"bandwidth": "10 Hz"}})
+    (tmp_path / "study.yaml").write_text(f"name: study\nbase: {path.name}\n")
+    called["sweep"] = testbed.sweep(tmp_path / "study.yaml", out=tmp_path / "sweep")
+    called["open_sweep"] = testbed.open_sweep(called["sweep"])
     assert sorted(called) == FUNCTIONS
     assert isinstance(called["open_run"], testbed.Run)
     assert isinstance(called["load_scenario"], testbed.Scenario)

@@ -2,7 +2,7 @@ r"""
 Error against frequency: which filter for which band?
 =====================================================
 
-A sine of 1 deg/s at nine frequencies, every filter with its defaults, beside the error of the best linear filter made
+A sine of 1 deg/s at six frequencies, every filter with its defaults, beside the error of the best linear filter made
 for each.
 The bands are the least and the largest of three seeds: one seed would rank the filters by its luck.
 """
@@ -12,28 +12,25 @@ import numpy as np
 
 import testbed
 
-FREQUENCIES = (0.5, 1.0, 2.0, 4.0, 10.0, 25.0, 60.0, 120.0, 250.0)
+FREQUENCIES = (0.5, 2.0, 10.0, 30.0, 100.0, 250.0)
+SEEDS = 3
 FILTERS = ("kalman", "wideband", "complementary")
 
 base = testbed.Scenario.from_dict(
     {
         "name": "one_line",
-        "duration": "3 s",
-        "settle": "1.5 s",
+        "duration": "1.5 s",
+        "settle": "0.75 s",
         "turntable": {"engine": "modal"},
         "motion": [{"sine": {"frequency": "1 Hz", "rate": "1 deg/s"}}],
         "sensors": {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}},
         "fusion": {name: {} for name in FILTERS},
     }
 )
-rmse = {name: np.empty((len(FREQUENCIES), 3)) for name in FILTERS}
-optimum = []
-for i, frequency in enumerate(FREQUENCIES):
-    for seed in range(3):
-        metrics = testbed.run(base.with_(**{"motion.0.sine.frequency": f"{frequency} Hz", "seed": seed})).metrics
-        for name in FILTERS:
-            rmse[name][i, seed] = metrics.fusion[name].rmse_deg_s
-    optimum.append(metrics.fusion["kalman"].optimum_rmse_deg_s)
+settings = [{"motion.0.sine.frequency": f"{frequency} Hz"} for frequency in FREQUENCIES]
+table = testbed.evaluate(base, range(SEEDS), settings)  # one list per frequency, one entry per seed
+rmse = {name: np.array([[one.fusion[name].rmse_deg_s for one in row] for row in table]) for name in FILTERS}
+optimum = [row[0].fusion["kalman"].optimum_rmse_deg_s for row in table]
 figure, axes = plt.subplots(layout="constrained", figsize=(7.0, 4.6))
 for (name, found), line in zip(rmse.items(), ("-", "--", "-."), strict=True):
     (drawn,) = axes.loglog(FREQUENCIES, np.median(found, axis=1), line, label=name)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from testbed.chain.instruments import start_filter, surroundings
 from testbed.fusion import FILTERS
+from testbed.fusion.lanes.together import Together
 from testbed.sensors import SENSORS
 from testbed.sensors.base import ExposedStage, SplitStage, Surroundings
 from testbed.sensors.checked import CheckedSensor
@@ -95,14 +96,19 @@ class ManyFilters:
 
     def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int]) -> None:
         spec = scenario.fusion[name]
-        first = start_filter(scenario, name, spec)
-        # Some design their gains before they start; a plug-in may not be made to be copied.
-        self._stages = {
-            seed: deepcopy(first) if spec.type in FILTERS else start_filter(scenario, name, spec) for seed in seeds
-        }
+        self._shipped = spec.type in FILTERS
+        if self._shipped:
+            rates = {sensor: part.sample_rate for sensor, part in scenario.sensors.items()}
+            first = spec.start(rates)
+            # Some design their gains before they start.
+            self._stages = {seed: deepcopy(first) for seed in seeds}
+            self._together = Together(first)
+        else:
+            self._stages = {seed: start_filter(scenario, name, spec) for seed in seeds}
 
     def process(self, readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[EstimateBlock]:
-        """Return the estimates over a block under some of the seeds.
+        """Return the estimates over a block under some of the seeds; of the diagnostics at least innovations, their
+        variances and counts of the gate. They hold until the next call.
 
         Parameters
         ----------
@@ -111,7 +117,8 @@ class ManyFilters:
         seeds : sequence of int
             Some of those given at the start.
         """
-        return [
-            self._stages[seed].process({name: values[j] for name, values in readings.items()})
-            for j, seed in enumerate(seeds)
-        ]
+        stages = [self._stages[seed] for seed in seeds]
+        given = [{name: values[j] for name, values in readings.items()} for j in range(len(seeds))]
+        if self._shipped:
+            return self._together.process(stages, given)
+        return [stage.process(values) for stage, values in zip(stages, given, strict=True)]

@@ -54,6 +54,12 @@ def line_of_sight(
     ------
     ScenarioError
         If the folder is no run, has no pointing and none is given, or what is given does not fit the run.
+
+    Examples
+    --------
+    >>> line_of_sight("nowhere")
+    Traceback (most recent call last):
+    testbed.errors.ScenarioError: nowhere: expected a run folder, but nowhere/scenario.yaml, ... is missing
     """
     run = RunRecord.open(run_dir)
     scenario = load_scenario(Path(run_dir) / "scenario.yaml", plugins=plugins)

@@ -7,7 +7,19 @@ from typing import Annotated
 import typer
 
 from testbed._version import __version__
-from testbed.cli.commands import allan, compensate, folder, log, parts, pointing, psd, reproduce, scenario
+from testbed.cli.commands import (
+    allan,
+    compensate,
+    design,
+    folder,
+    log,
+    parts,
+    pointing,
+    psd,
+    reproduce,
+    scenario,
+    sweep,
+)
 from testbed.cli.status import OK
 
 app = typer.Typer(
@@ -26,7 +38,9 @@ app.command()(folder.report)
 app.command()(allan.allan)
 app.command()(psd.psd)
 app.command()(pointing.pointing)
+app.command()(design.design)
 app.command()(reproduce.reproduce)
+app.command()(sweep.sweep)
 app.add_typer(compensate.app)
 app.add_typer(log.app)
 

@@ -17,6 +17,7 @@ from testbed.inputs.plugins import Plugins, load_plugins, offered
 from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
 from testbed.parts import resolve
+from testbed.pointing.parameters import Link, Mirror, Tracker, Window
 from testbed.reproduce import PAPERS
 from testbed.sensors import SENSORS
 from testbed.sensors.base import Sensor
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 
+# Parts of a scenario's `pointing`.
+POINTING = {"tracker": Tracker, "mirror": Mirror, "windows": Window, "link": Link}
 _KINDS = {"motion": MOTIONS, "sensor": SENSORS, "filter": FILTERS}
 
 
@@ -43,6 +46,7 @@ def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
         "sensor_presets": _heads("testbed.sensors", "presets"),
         "beliefs": _heads("testbed.fusion", "beliefs"),
         "band_sets": _heads("testbed.fusion", "bands"),
+        "pointing": {name: _summary(part) for name, part in POINTING.items()},
         "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
         "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from testbed.cli.console import ruled, terminal
+from testbed.cli.sights import aim_words
 from testbed.cli.understood import doubts, print_facts, print_sheets
 from testbed.fusion.coloured import slow_noise
 from testbed.scenario.departures import departures
@@ -87,6 +88,8 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
     _print_departures(scenario)
     print_sheets(console, scenario)
     print_facts(console, facts)
+    if scenario.pointing is not None:
+        console.print(f"pointing: {aim_words(scenario)}", soft_wrap=True, highlight=False)
     for line in slow_noise_lines(scenario):
         console.print(line, soft_wrap=True)
     console.print("The scenario is valid; --all shows every key.")

@@ -13,6 +13,8 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextC
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from testbed.campaigns.sweep import Progress as Sweeping
+
 _PLAIN_EVERY = 5.0
 
 
@@ -25,6 +27,45 @@ def progress(name: str, duration: float) -> Iterator[Callable[[float], None]]:
             yield _advance(bar, task)
     else:
         yield _plain(name, duration)
+
+
+@contextmanager
+def sweeping(name: str) -> Iterator[Callable[[Sweeping], None]]:
+    """Show how far a sweep is on standard error: a bar, or plain lines without a terminal."""
+    if sys.stderr.isatty():
+        columns = ("{task.description}", BarColumn(), "{task.completed} of {task.total}", TimeRemainingColumn())
+        with Progress(*columns, TextColumn("{task.fields[words]}"), console=Console(stderr=True)) as bar:
+            task = bar.add_task(name, total=None, words="")
+            yield lambda told: bar.update(task, total=told.runs, completed=told.done, words=_found(told))
+    else:
+        yield _plain_sweep(name)
+
+
+def _plain_sweep(name: str) -> Callable[[Sweeping], None]:
+    begun, last = None, -_PLAIN_EVERY
+
+    def tick(told: Sweeping) -> None:
+        nonlocal begun, last
+        now = time.monotonic()
+        if begun is None:
+            begun = now, told.done
+        if told.done < told.runs and now - last < _PLAIN_EVERY:
+            return
+        words = [f"{name}: {told.done} of {told.runs} runs"]
+        if told.done > begun[1]:
+            rate = (told.done - begun[1]) / max(now - begun[0], 1e-9)
+            words += [f"{rate:.3g} a second", f"{(told.runs - told.done) / rate:.0f} s remaining"]
+        print(", ".join([*words, _found(told)]), file=sys.stderr, flush=True)  # noqa: T201 - this is the terminal
+        last = now
+
+    return tick
+
+
+def _found(told: Sweeping) -> str:
+    words = [f"{told.failed} failed"] if told.failed else []
+    if told.best is not None and told.worst is not None:
+        words += [f"best {told.best[0]:.3g} deg/s ({told.best[1]})", f"worst {told.worst[0]:.3g} ({told.worst[1]})"]
+    return ", ".join(words)
 
 
 class Pace:

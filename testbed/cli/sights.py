@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from testbed.runs.metrics import PointingBudget, PointingMetrics
+    from testbed.scenario.model import Scenario
 
 
 def print_sights(console: Console, sights: Mapping[str, PointingMetrics]) -> None:
@@ -42,6 +43,23 @@ def print_sights(console: Console, sights: Mapping[str, PointingMetrics]) -> Non
     for name, sight in sights.items():
         for words in _words(sight):
             console.print(f"{name}: {words}", soft_wrap=True, highlight=False)
+
+
+def aim_words(scenario: Scenario) -> str:
+    """Return what follows from the pointing of a scenario before it runs: margins, delays, and what the lead covers.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With pointing.
+    """
+    pointing = scenario.pointing
+    assert pointing is not None
+    mirror, margins = pointing.mirror, pointing.margins()
+    loop = f"phase margin {margins.phase_deg:.3g} deg, gain margin {margins.gain_db:.3g} dB"
+    late = f"{1e6 * (mirror.own_delay + mirror.latency):.4g} us late, {1e6 * sum(mirror.lead_times):.4g} us led"
+    names = ", ".join(pointing.feed_forward or scenario.fusion)
+    return f"{names} to a mirror {late}; tracker of {pointing.tracker.bandwidth:g} Hz: {loop}"
 
 
 def _words(sight: PointingMetrics) -> Iterator[str]:

@@ -187,9 +187,28 @@ class BlockFilter:
         ValueError
             If a sensor is missing, unknown or has not as many readings as are due.
         """
+        return self.estimated(*self.received(readings))
+
+    def received(self, readings: Mapping[str, ArrayLike]) -> tuple[FloatArray, FloatArray]:
+        """Return the readings of the next block as the filter sees them, and how many were struck out so far.
+
+        Parameters
+        ----------
+        readings : mapping of str to array_like, shape (n_sensor_samples,)
+            As for `process`.
+
+        Returns
+        -------
+        Z, gated : ndarray, shape (n_sensor, n_time)
+            Readings at the fastest rate [rad/s], NaN where none is due, infinite where one is missing; counts.
+        """
         Z = self.schedule.spread(readings)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
         Z.flags.writeable = False
+        return Z, gated
+
+    def estimated(self, Z: FloatArray, gated: FloatArray) -> EstimateBlock:
+        """Return the estimate over a block that was `received`; arguments as it returns them."""
         out = self._rows_of(Z.shape[1])
         self._advance(Z, out)
         return self._shown(out, gated)

@@ -122,34 +122,36 @@ def _setting(belief: SensorBelief, sample_rate_hz: float) -> tuple[float, float,
 def strike(Z, state, setting, counts):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Do what `Gate.process` says, one sensor after the other."""
     for i in range(Z.shape[0]):
+        # In variables: through the array each reading would wait for what the last one stored.
+        last, repeats, square, seen = state[i, LAST], state[i, REPEATS], state[i, SQUARE], state[i, SEEN]
+        waiting, gated = state[i, WAITING], state[i, GATED]
+        limit, most, noise = setting[i, LIMIT], setting[i, MOST_REPEATS], setting[i, NOISE]
         for k in range(Z.shape[1]):
-            if np.isinf(Z[i, k]):
+            z = Z[i, k]
+            if np.isinf(z):
                 # What comes after a gap is no jump.
-                state[i, SEEN] = -1.0
-            elif np.isfinite(Z[i, k]) and not good(Z[i, k], state[i], setting[i]):
-                state[i, GATED] += 1.0
-                Z[i, k] = np.inf
-            counts[i, k] = state[i, GATED]
-
-
-@njit(cache=True, error_model="numpy")
-def good(z, state, setting):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Return whether a reading is one, and remember it."""
-    state[REPEATS] = state[REPEATS] + 1.0 if z == state[LAST] else 0.0
-    step, state[LAST] = z - state[LAST], z
-    if abs(z) >= setting[LIMIT] or 0.0 < setting[MOST_REPEATS] <= state[REPEATS]:
-        # Nor is what comes after this.
-        state[SEEN] = -1.0
-        return False
-    if z == state[WAITING]:
-        return False
-    if not np.isnan(state[WAITING]):
-        state[WAITING], state[SEEN] = np.nan, -1.0
-    calm = max(2.0 * setting[NOISE] * setting[NOISE], state[SQUARE])
-    if setting[NOISE] > 0.0 and state[SEEN] > CALM and step * step > JUMP_SQUARE * calm:
-        state[WAITING] = z
-        return False
-    state[SEEN] += 1.0
-    if state[SEEN] > 0.0:
-        state[SQUARE] += (step * step - state[SQUARE]) / min(state[SEEN], CALM)
-    return True
+                seen = -1.0
+            elif not np.isnan(z):
+                repeats = repeats + 1.0 if z == last else 0.0
+                step, last = z - last, z
+                good = False
+                if abs(z) >= limit or 0.0 < most <= repeats:
+                    # Nor is what comes after this.
+                    seen = -1.0
+                elif z != waiting:
+                    if not np.isnan(waiting):
+                        waiting, seen = np.nan, -1.0
+                    calm = max(2.0 * noise * noise, square)
+                    if noise > 0.0 and seen > CALM and step * step > JUMP_SQUARE * calm:
+                        waiting = z
+                    else:
+                        good = True
+                        seen += 1.0
+                        if seen > 0.0:
+                            square += (step * step - square) / min(seen, CALM)
+                if not good:
+                    gated += 1.0
+                    Z[i, k] = np.inf
+            counts[i, k] = gated
+        state[i, LAST], state[i, REPEATS], state[i, SQUARE], state[i, SEEN] = last, repeats, square, seen
+        state[i, WAITING], state[i, GATED] = waiting, gated

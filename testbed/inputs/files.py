@@ -34,8 +34,10 @@ def read_bytes(path: Path, most: int, what: str) -> bytes:
         # Not blocking: opening a pipe would wait for its other end.
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
         with os.fdopen(handle, "rb") as stream:
-            mode = os.fstat(stream.fileno()).st_mode
-            content = stream.read(most + 1) if stat.S_ISREG(mode) else None
+            found = os.fstat(stream.fileno())
+            # What the kernel makes up is regular and has no length: reading may wait for what it has to say.
+            regular = stat.S_ISREG(found.st_mode)
+            content = stream.read(min(most + 1, found.st_size)) if regular else None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise ScenarioError([Problem(f"cannot be read: {reason}", file=shortened_path(path))]) from error

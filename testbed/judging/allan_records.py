@@ -77,7 +77,7 @@ def read(
     """
     wanted = wanted or Selection()
     if source.is_dir():
-        given = ["--column"] * bool(wanted.column) + ["--map"] * bool(wanted.map) + wanted.given
+        given = ["--column"] * bool(wanted.column) + wanted.of_files
         if given:
             raise refusal(source, "expected a file with it; a run folder knows its signals", given[0])
         return read_run(source, sensor)

@@ -169,6 +169,9 @@ def estimate_density(
     """
     if method not in METHODS:
         raise ScenarioError([Problem(f"expected {' or '.join(METHODS)}, got {method!r}", key="--method")])
+    if np.nanmin(record.rate) == np.nanmax(record.rate):
+        message = f"expected a rate that changes, all are {np.degrees(np.nanmin(record.rate)):g} deg/s"
+        raise ScenarioError([Problem(message, file=record.content)])
     rate = record.rate - np.nanmean(record.rate)
     lost = int(np.count_nonzero(np.isnan(rate)))
     make = _welch if method == "welch" else _multitaper
@@ -283,8 +286,7 @@ def densities(
         If something is missing, not understood or belongs to the other kind of source.
     """
     if source.is_dir():
-        if wanted.given or wanted.map:
-            given = wanted.given or ["--map"]
+        if given := wanted.of_files:
             raise ScenarioError(
                 [Problem("expected a file with it; a run folder knows its signals", key=given[0], file=str(source))]
             )

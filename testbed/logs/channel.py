@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Places of the even grid that a recording may leave free, for each of its samples and at all.
 _MOST_FREE, _FREE_AT_ALL = 4, 1_000_000
 _TURN = 2.0 * np.pi
-_FEWEST = 4
+FEWEST = 4
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class LogChannel:
             If there are fewer than 4 samples, no time at all, or the stamps are not even: with the first place and the
             option that takes them as even.
         """
-        if self.values.size < _FEWEST:
-            raise refusal(self.table.path, f"expected at least {_FEWEST} samples, got {self.values.size}")
+        if self.values.size < FEWEST:
+            raise refusal(self.table.path, f"expected at least {FEWEST} samples, got {self.values.size}")
         if self.stamps_ns is None or self.clock is None:
             if not np.isfinite(self.rate_hz):
                 message = "expected either the sample rate (--rate) or the column of the time (--time)"
@@ -166,8 +166,9 @@ def refuse_uneven(table: Table, clock: TimeBase) -> None:
     ScenarioError
         If a stamp goes back or stands twice, or a step is no multiple of the usual one.
     """
-    mean = f"'{clock.mean_rate_hz:.6g} Hz'" if np.isfinite(clock.mean_rate_hz) else "with the true rate"
-    rate = f"--rate {mean}"
+    rate = f"--rate '{clock.mean_rate_hz:.6g} Hz'" if np.isfinite(clock.mean_rate_hz) else "--rate (the true one)"
+    if clock.end_ns == clock.start_ns:
+        raise refusal(table.path, f"the stamps stand still: {rate} without --time takes the samples as even", "--time")
     if clock.coarse:
         message = (
             f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, which is coarser than the samples "

@@ -140,12 +140,12 @@ class ClockScan:
     ----------
     resolution_ns : float
         What a number of the file's type can tell apart [ns].
-    wrap_ns : int
-        Length of the counter's turn [ns]; 0: none.
+    wraps_ns : tuple of int
+        Lengths that the counter's turn may have [ns], the longest last; empty: none.
     """
 
-    def __init__(self, resolution_ns: float = 0.0, wrap_ns: int = 0) -> None:
-        self._resolution, self._wrap = resolution_ns, wrap_ns
+    def __init__(self, resolution_ns: float = 0.0, wraps_ns: tuple[int, ...] = ()) -> None:
+        self._resolution, self._wraps_ns = resolution_ns, wraps_ns
         self._n_time, self._start, self._last, self._usual = 0, 0, 0, 0.0
         self._quantum, self._wraps, self._turned = 0, 0, 0
         self._gaps, self._uneven, self._doubled, self._backward = Tally(), Tally(), Tally(), Tally()
@@ -219,17 +219,24 @@ class ClockScan:
         )
 
     def _unwrapped(self, stamps: Stamps) -> Stamps:
-        """Add a turn of the counter wherever it begins anew."""
-        if not self._wrap:
+        """Add a turn of the counter wherever it begins anew.
+
+        The longest turn is taken for any step back by more than half of it, a shorter one where it leaves a step of a
+        few samples.
+        """
+        if not self._wraps_ns:
             return stamps
         stamps = stamps + self._turned
         steps = np.diff(stamps, prepend=stamps[:1] if not self._n_time else np.int64(self._last))
-        turns = steps < -self._wrap // 2
-        if not turns.any():
+        if not (steps < 0).any():
             return stamps
-        self._wraps += int(turns.sum())
-        self._turned += int(turns.sum()) * self._wrap
-        whole: Stamps = stamps + np.cumsum(turns) * self._wrap
+        usual = self._usual or usual_step(steps)
+        turns = np.where(steps < -self._wraps_ns[-1] // 2, self._wraps_ns[-1], 0)
+        for wrap in reversed(self._wraps_ns):
+            turns[(steps < 0) & (steps + wrap > 0) & (steps + wrap <= _ON_GRID * usual)] = wrap
+        self._wraps += int(np.count_nonzero(turns))
+        self._turned += int(turns.sum())
+        whole: Stamps = stamps + np.cumsum(turns)
         return whole
 
     def _tell(self, rows: NDArray[np.intp], steps: Stamps, stamps: Stamps) -> None:

@@ -6,14 +6,15 @@ Found in the first megabyte. What can be read in two ways is an error that names
 from __future__ import annotations
 
 import codecs
-import csv
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from testbed.errors import quoted, shortened
-from testbed.logs.names import clean_unit, quantity_of
+from testbed.logs.cells import CLOCK, COMMA, COMMENTS, HEX, ISO, LONGEST_NAME, POINT, fields_of, is_value
+from testbed.logs.heading import commented_names, find_header, names_but_one, preamble_of
+from testbed.logs.names import clean_unit
 from testbed.logs.options import refusal
 from testbed.logs.ornaments import Ornaments, find_ornaments
 
@@ -24,20 +25,10 @@ if TYPE_CHECKING:
 
 HEAD = 1 << 20
 MOST_COLUMNS = 10_000
-COMMENTS = ("#", "%", "//")
 _SAMPLE, _MANY = 200, 10
-# Characters of a name or of a line of the preamble: more say nothing to a reader.
-_LONGEST = 200
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 _WORDS = {"tab": "\t", "\\t": "\t", "blank": " ", "space": " "}
-_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
-_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
-# ISO 8601, and day.month.year, which no one reads in another order.
-ISO = re.compile(r"(\d{4}-\d\d-\d\d|\d\d\.\d\d\.\d{4})[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?(Z|[+-]\d\d:?\d\d)?")
-CLOCK = re.compile(r"\d\d:\d\d:\d\d([.,]\d{1,9})?")
 _MISSING = {"", "na", "n/a", "null", "none", "-"}
-_HEX = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
-_UNITLESS = re.compile(r"[\[(].*[\])]|-*")
 
 
 @dataclass(frozen=True)
@@ -137,6 +128,8 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
     ScenarioError
         If it holds no column of numbers, or can be read in two ways.
     """
+    if options.drop_faulty and not head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        head = head.rstrip(b"\0")
     encoding = options.encoding or find_encoding(path, head)
     lines = _lines(path, head, encoding, complete=complete)
     rest = [(number, text) for number, text in lines if number > (options.skip or 0)]
@@ -145,7 +138,8 @@ def find_dialect(path: Path, head: bytes, *, complete: bool, options: TextOption
         content = [(number, text) for number, text in content if re.search(word_pattern(options.only), text)]
     if not content:
         only = "" if options.only is None else f" with the word {quoted(options.only)}"
-        raise refusal(path, f"expected a column of numbers, got no line{only}")
+        where = only if complete else f"{only} in the first {HEAD >> 20} MB but comments"
+        raise refusal(path, f"expected a column of numbers, got no line{where}")
     ornaments = find_ornaments([text for _, text in _tail(content)])
     if ornaments.swaps:
         content = [(number, ornaments.off(text)) for number, text in content]
@@ -186,6 +180,8 @@ def find_encoding(path: Path, head: bytes) -> str:
     """
     for mark, name in (
         (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF32_LE, "utf-32"),
+        (codecs.BOM_UTF32_BE, "utf-32"),
         (codecs.BOM_UTF16_LE, "utf-16"),
         (codecs.BOM_UTF16_BE, "utf-16"),
     ):
@@ -196,26 +192,13 @@ def find_encoding(path: Path, head: bytes) -> str:
         if min(even, odd) == 0 and max(even, odd) > len(head[:4000]) // 6:
             return "utf-16-le" if odd else "utf-16-be"
         line = head.count(b"\n", 0, head.index(b"\0")) + 1
-        raise refusal(
-            path, "cannot be read: a NUL byte, so it is no text, or it was cut while written; remove it", line=line
-        )
+        message = "cannot be read: a NUL byte, so it is no text, or it was cut while written"
+        raise refusal(path, f"{message}; remove it, or --drop-faulty", line=line)
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
         return "cp1252"
     return "utf-8"
-
-
-def fields_of(text: str, separator: str) -> list[str]:
-    """Return the fields of a line without the blanks around them."""
-    if separator == " ":
-        # A unit in brackets belongs to the name before it.
-        closed = ("[" in text and "]" in text) or ("(" in text and ")" in text)
-        joined = text.strip().replace(" [", "\0[").replace(" (", "\0(") if closed else text
-        return [field.replace("\0", " ") for field in joined.split()]
-    if '"' not in text:
-        return [field.strip() for field in text.split(separator)]
-    return [field.strip() for field in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [""])]
 
 
 def _lines(path: Path, head: bytes, encoding: str, *, complete: bool) -> list[tuple[int, str]]:
@@ -263,7 +246,7 @@ def _refuse_mixture(path: Path, lines: list[str], share: float) -> None:
         cells = [cell for line in lines for cell in fields_of(line, separator)]
         comma, point = (
             sum(mark in cell and bool(pattern.fullmatch(cell)) for cell in cells)
-            for mark, pattern in ((",", _COMMA), (".", _POINT))
+            for mark, pattern in ((",", COMMA), (".", POINT))
         )
         if comma and point and comma + point > (share + 0.2) * len(cells):
             message = f"numbers with a decimal comma ({comma}) and with a point ({point})"
@@ -276,15 +259,9 @@ def _share(lines: list[str], separator: str, decimal: str) -> tuple[float, int]:
     n_columns = Counter(map(len, rows)).most_common(1)[0][0]
     # An empty field is a missing value, and says nothing.
     cells = [cell for row in rows if len(row) == n_columns for cell in row if cell]
-    good = sum(_is_value(cell, decimal) for cell in cells)
+    good = sum(is_value(cell, decimal) for cell in cells)
     # Rows of another length cannot be read, so they count as fields that are none.
     return good / max(len(cells) + n_columns * sum(len(row) != n_columns for row in rows), 1), n_columns
-
-
-def _is_value(cell: str, decimal: str) -> bool:
-    return bool(
-        (_POINT if decimal == "." else _COMMA).fullmatch(cell) or any(p.fullmatch(cell) for p in (ISO, CLOCK, _HEX))
-    )
 
 
 def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: str, options: TextOptions) -> None:
@@ -299,7 +276,7 @@ def _refuse_two_readings(path: Path, lines: list[str], separator: str, decimal: 
     ):
         pairs = [row for row in rows if len(row) == len(rows[-1]) and len(row) % 2 == 0]
         fractions = {cell for row in pairs for cell in row[1::2] if re.fullmatch(r"0\d+", cell)}
-        header = next((row for row in rows if not any(_is_value(cell, ".") for cell in row)), None)
+        header = next((row for row in rows if not any(is_value(cell, ".") for cell in row)), None)
         named = header is not None and len(header) == len(rows[-1])
         if (fractions and not named) or (header is not None and pairs and 2 * len(header) == len(pairs[-1])):
             what = "may be columns with commas between, or numbers with a decimal comma"
@@ -330,18 +307,19 @@ def _parts(
     first = rows[start][0]
     above = [(number, row) for number, row in rows[:start]]
     n_named = n_columns - all(len(row) != n_columns or row[-1] == "" for _, row in rows[start : start + _SAMPLE])
-    header, unit_line = _header(above, n_named, n_columns)
-    names, header_line = (header[1], header[0]) if header else _commented(lines, first, separator, n_named)
+    header, unit_line = find_header(above, n_named, n_columns)
+    header = header or names_but_one(above, n_named, decimal)
+    names, header_line = (header[1], header[0]) if header else commented_names(lines, first, separator, n_named)
     return Dialect(
         encoding=encoding,
         separator=separator,
         decimal=decimal,
         skip=first - 1,
         n_columns=n_columns,
-        names=tuple(name[:_LONGEST] for name in names[:n_named]),
-        units=tuple(clean_unit(unit[:_LONGEST]) for unit in unit_line[1][:n_named]) if unit_line else (),
+        names=tuple(name[:LONGEST_NAME] for name in names[:n_named]),
+        units=tuple(clean_unit(unit[:LONGEST_NAME]) for unit in unit_line[1][:n_named]) if unit_line else (),
         kinds=tuple(kinds[:n_named]),
-        preamble=_preamble([text for number, text in lines if number < (header_line or first)]),
+        preamble=preamble_of([text for number, text in lines if number < (header_line or first)]),
         header_line=header_line,
         unit_line=unit_line[0] if unit_line else None,
         ornaments=Ornaments(),
@@ -364,11 +342,11 @@ def _kind(cells: list[str], decimal: str) -> str:
     known = [cell for cell in cells if cell.lower() not in _MISSING]
     if not known:
         return "number" if cells else "text"
-    number = _POINT if decimal == "." else _COMMA
+    number = POINT if decimal == "." else COMMA
     tests = (
         ("integer", lambda cell: re.fullmatch(r"[+-]?\d{1,19}", cell)),
         ("number", number.fullmatch),
-        ("hex", _HEX.fullmatch),
+        ("hex", HEX.fullmatch),
         ("iso", ISO.fullmatch),
         ("clock", CLOCK.fullmatch),
     )
@@ -382,59 +360,6 @@ def _kind(cells: list[str], decimal: str) -> str:
 
 def _is_row(row: list[str], readable: list[int], decimal: str) -> bool:
     values = [row[i] for i in readable]
-    return any(_is_value(v, decimal) for v in values) and all(
-        _is_value(v, decimal) or v.lower() in _MISSING for v in values
+    return any(is_value(v, decimal) for v in values) and all(
+        is_value(v, decimal) or v.lower() in _MISSING for v in values
     )
-
-
-def _header(
-    above: list[tuple[int, list[str]]], n_named: int, n_columns: int
-) -> tuple[tuple[int, list[str]] | None, tuple[int, list[str]] | None]:
-    """Return the line of names and the line of units above the rows, each with its number, or None.
-
-    The names are those above the units, else the nearest; where they leave columns without a name of their own, the
-    line above them says the rest.
-    """
-    near: list[tuple[int, list[str]]] = []
-    for number, row in reversed(above):
-        if len(row) not in {n_named, n_columns}:
-            break
-        near.append((number, row[:n_named]))
-    if not near:
-        return None, None
-    at = next(
-        (k for k, (_, row) in enumerate(near[:2]) if k + 1 < len(near) and any(row) and all(map(_is_unit, row))), None
-    )
-    place = 0 if at is None else at + 1
-    number, names = near[place]
-    if place + 1 < len(near) and (len(set(names)) < len(names) or not all(names)):
-        above_them = near[place + 1][1]
-        names = [" ".join(filter(None, pair)) for pair in zip(above_them, names, strict=False)]
-    return (number, names), None if at is None else near[at]
-
-
-def _is_unit(cell: str) -> bool:
-    return bool(_UNITLESS.fullmatch(cell) or quantity_of(clean_unit(cell[:_LONGEST])))
-
-
-def _commented(lines: list[tuple[int, str]], first: int, separator: str, n_named: int) -> tuple[list[str], int | None]:
-    """Return the names of a header that stands behind a comment mark, and its line."""
-    comments = [
-        (number, text.strip()) for number, text in lines if number < first and text.lstrip().startswith(COMMENTS)
-    ]
-    for number, text in comments[-1:]:
-        names = fields_of(text.lstrip("#%/").strip(), separator)
-        words = n_named == 1 and " " in names[0]
-        if len(names) == n_named and not words and not all(_is_value(name, ".") for name in names):
-            return names, number
-    return [], None
-
-
-def _preamble(lines: list[str]) -> dict[str, str]:
-    """Return what ``key,value``, ``key: value`` and ``key = value`` lines say."""
-    found = {}
-    for line in lines:
-        match = re.match(r"\s*(?:#|%|//)?\s*([^,;:=\t]+?)\s*[,;:=\t]\s*(.+?)[\s,;]*$", line[:_LONGEST])
-        if match:
-            found[match[1].strip()] = match[2].strip()
-    return found

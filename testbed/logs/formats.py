@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
@@ -44,6 +45,7 @@ _STRANGERS = (
     (b"\x89PNG", "a picture"),
     (b"RIFF", "a RIFF file (sound): write its samples to a text or npy file"),
 )
+_MAT4, _LONGEST_NAME = struct.Struct("<5i"), 64
 _JSON = re.compile(rb'\s*[\[{]\s*["{\[]')
 _JSON_LINE = re.compile(rb"\s*[\[{][^\[{\]}\n]*[\]}],?\r?\n")
 _MINISEED = re.compile(rb"(\d{6}[DRQM][ \0])|(MS\x03)")
@@ -84,6 +86,8 @@ def open_table(path: Path, options: TextOptions | None = None) -> Table:
     """
     if not path.is_file():
         raise refusal(path, "expected a recording (a file), got none")
+    if not path.stat().st_size:  # or one of the kernel's, which may keep a reader waiting
+        raise refusal(path, "expected a recording, got an empty file")
     try:
         with path.open("rb") as stream:
             head = stream.read(512)
@@ -114,11 +118,23 @@ def format_of(path: Path, head: bytes) -> str:
     for mark, name in SIGNATURES:
         if head.startswith(mark):
             return name
+    if _is_mat4(head):
+        return "MATLAB 4"
     if _JSON.match(head) and not _JSON_LINE.match(head):
         raise refusal(
             path, 'expected a recording, got JSON in one piece: write one sample a line, such as {"t": 0, "w": 1}'
         )
     return "MiniSEED" if _MINISEED.match(head) else "UFF" if _UFF.match(head) else "text"
+
+
+def _is_mat4(head: bytes) -> bool:
+    """Return whether a file begins as a matrix of MATLAB 4 does, which has no mark: five numbers and a name."""
+    if len(head) < _MAT4.size:
+        return False
+    kind, rows, columns, imaginary, length = _MAT4.unpack_from(head)
+    name = head[_MAT4.size : _MAT4.size + length] if 1 < length <= _LONGEST_NAME else b""
+    known = kind in range(0, 60, 10) and rows > 0 and columns > 0 and imaginary in {0, 1}
+    return known and name.endswith(b"\0") and name[:-1].isalnum()
 
 
 def _is_mat73(path: Path, head: bytes) -> bool:
@@ -158,10 +174,10 @@ def _open(path: Path, name: str, options: TextOptions | None) -> Table:
         from testbed.logs.readers.arrow import ArrowTable
 
         return ArrowTable(path, name)
-    if name == "MATLAB 5":
+    if name in {"MATLAB 4", "MATLAB 5"}:
         from testbed.logs.readers.matlab import open_mat
 
-        return open_mat(path)
+        return open_mat(path, name)
     from testbed.logs.readers import numpy_files
 
     return {"npy": numpy_files.open_npy, "npz": numpy_files.open_npz, "NetCDF 3": numpy_files.open_netcdf3}[name](path)

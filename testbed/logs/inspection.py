@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from testbed.logs.table import Block, Table
 
 _PLACES = 5
+# Values looked at in one go: copies of all would take as much memory again, several times over.
+_BLOCK = 1 << 20
 _GYRO = re.compile(r"gyr|rate|omega|\bw\b|^[grw]_?[xyz]$", re.IGNORECASE)
 
 
@@ -251,7 +253,8 @@ def remarks(channel: LogChannel) -> list[str]:
     if channel.clock is not None and channel.clock.wraps:
         said.append(f"the counter of the stamps began anew {channel.clock.wraps} times, which was taken into account")
     scan = ValueScan()
-    scan.add(channel.values)
+    for start in range(0, channel.values.size, _BLOCK):
+        scan.add(channel.values[start : start + _BLOCK])
     values, factor = scan.result(), channel.factor
     if values.repeats > 1.0:
         said.append(_repeats_text(values, channel.label))

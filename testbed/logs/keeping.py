@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Numbers that are kept at most: 1 GB of them, and what is made of them takes as much several times over.
 MOST_KEPT = 1 << 27
-_GOOD_AVERAGE = 100
+_GOOD_AVERAGE = 1000
 
 
 def kept_columns(
@@ -63,7 +63,8 @@ def kept_columns(
             raise refusal(table.path, f"{error}: cut the record in parts", "--time") from error
         if n_kept > MOST_KEPT:
             message = f"holds more than the {MOST_KEPT >> 20} million numbers that are kept in memory"
-            raise refusal(table.path, f"{message}: --average {_GOOD_AVERAGE} keeps means of as many samples")
+            remedy = f"--average {_GOOD_AVERAGE} keeps means of as many samples, which take about 100 bytes each"
+            raise refusal(table.path, f"{message}: {remedy}")
     if not n_time:
         raise refusal(table.path, "expected at least 4 samples, got 0")
     return kept.result()

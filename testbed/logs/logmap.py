@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 
 from testbed import units
 from testbed.document import Document
-from testbed.errors import quoted
+from testbed.errors import MOST_QUOTED, quoted
 from testbed.logs.names import QUANTITIES, quantity_of, second
 from testbed.logs.options import quantity
 from testbed.logs.selection import TextOptions
@@ -37,6 +37,8 @@ def _by_number(value: Any) -> Any:
     return str(value) if type(value) is int else value
 
 
+# What a unit, a range or an encoding takes at the most; messages repeat it.
+Words = Annotated[str, Field(max_length=MOST_QUOTED)]
 ColumnText = Annotated[str, BeforeValidator(_by_number)]
 Location = Annotated[Path, AfterValidator(_beside_map)]
 
@@ -59,8 +61,8 @@ class TimeMap(Part):
     """
 
     column: ColumnText | None = None
-    unit: str | None = None
-    epoch: str | None = None
+    unit: Words | None = None
+    epoch: Words | None = None
     rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False), BeforeValidator(_plain_frequency)] | None = None
     offset: Annotated[float, units.Quantity("s", "1 ms")] = 0.0
 
@@ -116,13 +118,13 @@ class ChannelMap(Part):
     column: ColumnText
     file: Location | None = None
     topic: str | None = None
-    unit: str | None = None
-    scale: str | None = None
+    unit: Words | None = None
+    scale: Words | None = None
     kind: Kind | None = None
     sign: Literal[1, -1] = 1
-    axis: str | None = None
+    axis: Words | None = None
     time: TimeMap | None = None
-    range: str | None = None
+    range: Words | None = None
 
     @model_validator(mode="after")
     def _units(self) -> ChannelMap:
@@ -152,12 +154,12 @@ class LogMap(Part):
 
     file: Location | list[Location] | None = None
     channels: Annotated[dict[str, ChannelMap], Field(min_length=1)]
-    separator: str | None = None
-    decimal: str | None = None
-    encoding: str | None = None
+    separator: Words | None = None
+    decimal: Words | None = None
+    encoding: Words | None = None
     skip: Annotated[int, Field(ge=0)] | None = None
-    missing: str | None = None
-    only: str | None = None
+    missing: Words | None = None
+    only: Words | None = None
     drop_faulty: bool = False
 
     @property

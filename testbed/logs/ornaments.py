@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 _MOST = 0.8
+# Characters of a row that are looked at.
+_LONGEST = 2000
 _EDGE = r"(?:^|(?<=[\s,;|]))"
-_LABEL = re.compile(_EDGE + r'"?([A-Za-z_][\w .()\[\]/°-]*?)"?[ ]*[:=][ ]*(?=[-+.]?\d)')
-_UNIT = re.compile(r"(?<=[\d.])[ ]*([A-Za-z°µμº][\w°º/^*·-]*)(?=[ ]*(?:[,;|\t]|$))")
+# Each repetition is bounded, so that a line made to be slow takes no longer than another of its length.
+_LABEL = re.compile(_EDGE + r'"?([A-Za-z_][\w .()\[\]/°-]{0,40}?)"?[ ]{0,4}[:=][ ]{0,4}(?=[-+.]?\d)')
+_UNIT = re.compile(r"(?<=[\d.])[ ]{0,4}([A-Za-z°µμº][\w°º/^*·-]{0,20})(?=[ ]{0,4}(?:[,;|\t]|$))")
 _BEHIND_ARROW = re.compile(r"-> *[^,;|\t]*([,;|\t])")
 
 
@@ -80,7 +83,7 @@ def find_ornaments(rows: Sequence[str]) -> Ornaments:
         Empty for a plain table.
     """
     swaps: list[Swap] = []
-    rest = list(rows)
+    rest = [row[:_LONGEST] for row in rows]
     labels: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     for look in _LOOKS:
@@ -125,13 +128,13 @@ def _labels(rows: Sequence[str]) -> list[Swap]:
     if not labels:
         return []
     words = "|".join(sorted(map(re.escape, set(labels)), key=len, reverse=True))
-    return [Swap(rf'{_EDGE}"?(?:{words})"?[ ]*[:=][ ]*', "", "labels")]
+    return [Swap(rf'{_EDGE}"?(?:{words})"?[ ]{{0,4}}[:=][ ]{{0,4}}', "", "labels")]
 
 
 def _units(rows: Sequence[str]) -> list[Swap]:
     found = {unit for unit in _usual([_units_of(row) for row in rows]) if unit}
     words = "|".join(sorted(map(re.escape, found), key=len, reverse=True))
-    return [Swap(rf"(?<=[\d.])[ ]*(?:{words})(?=[ ]*(?:[,;|\t\r]|$))", "", "units")] if found else []
+    return [Swap(rf"(?<=[\d.])[ ]{{0,4}}(?:{words})(?=[ ]{{0,4}}(?:[,;|\t\r]|$))", "", "units")] if found else []
 
 
 def _units_of(row: str) -> tuple[str, ...]:
@@ -157,8 +160,8 @@ def _thousands(rows: Sequence[str]) -> list[Swap]:
     """Return marks between thousands, where another separator or quotes leave no doubt."""
     what = "marks between thousands"
     apart = bool(rows) and all(re.search(r"[;|\t]", row) for row in rows)
-    point, comma = r"(?<=\d)\.(?=\d{3}(?:\.\d{3})*,\d)", r"(?<=\d),(?=\d{3}(?:,\d{3})*\.\d)"
-    quoted = r'(?<=\d),(?=\d{3}(?:,\d{3})*(?:\.\d+)?")'
+    point, comma = r"(?<=\d)\.(?=\d{3}(?:\.\d{3}){0,5},\d)", r"(?<=\d),(?=\d{3}(?:,\d{3}){0,5}\.\d)"
+    quoted = r'(?<=\d),(?=\d{3}(?:,\d{3}){0,5}(?:\.\d{0,20})?")'
     found = [Swap(rf"(?<=\d){mark}(?=\d{{3}})", "", what) for mark in ("'", "\u2019")] + [Swap(quoted, "", what)]
     if apart:
         found += [Swap(point, "", what), Swap(comma, "", what)]

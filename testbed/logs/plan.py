@@ -168,6 +168,13 @@ def time_columns(table: Table, group: str) -> list[int]:
         for i, (c, label) in enumerate(zip(table.columns, labels(table), strict=True))
         if c.group == group and label.quantity == "time"
     ]
+    if not found:
+        # A column without a name that holds times is the time, if there is one of them.
+        dated = sorted(getattr(getattr(table, "inner", table), "dated", ()))
+        found = dated if len(dated) == 1 else []
+    if len(found) > 1:
+        # A large T beside another time is a temperature.
+        found = [i for i in found if table.columns[i].short != "T"]
     preferred = [i for i in found if labels(table)[i].name in _PREFERRED]
     stamped = [i for i in found if table.columns[i].short in {"timestamp", "time", "t", "log_time_ns"}]
     return preferred or (found if len(found) < 2 or len(stamped) != 1 else stamped)
@@ -175,7 +182,12 @@ def time_columns(table: Table, group: str) -> list[int]:
 
 def channels_of(table: Table) -> list[int]:
     """Return the columns that are no time."""
-    return [i for i, label in enumerate(labels(table)) if label.quantity != "time" and i not in unreadable(table)]
+    dated: Collection[int] = getattr(getattr(table, "inner", table), "dated", ())
+    return [
+        i
+        for i, label in enumerate(labels(table))
+        if label.quantity != "time" and i not in unreadable(table) and i not in dated
+    ]
 
 
 def unreadable(table: Table) -> Collection[int]:
@@ -298,7 +310,7 @@ def _timed(
         if len(found) == 1 and not _ambiguous_unit(table, found[0]):
             return found[0], _time_unit(table, found[0], None, keys, guessed=True)[0], said.rate, False, []
         return None, 1.0, said.rate, False, []
-    found = time_columns(table, column.group)
+    found = [i for i in time_columns(table, column.group) if table.columns[i].n_time == column.n_time]
     if len(found) > 1:
         names = _few([table.columns[i].name for i in found])
         raise refusal(table.path, f"expected one column of time, got {names}: say which", keys("time.column"))

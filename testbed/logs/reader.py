@@ -11,7 +11,7 @@ import numpy as np
 
 from testbed.errors import Problem, ScenarioError, quoted
 from testbed.logs.chain import FileChain
-from testbed.logs.channel import Log, LogChannel, refuse_uneven
+from testbed.logs.channel import FEWEST, Log, LogChannel, refuse_uneven
 from testbed.logs.clock import ClockScan
 from testbed.logs.formats import open_table
 from testbed.logs.keeping import kept_columns
@@ -157,13 +157,17 @@ def _read_group(plans: Sequence[Plan]) -> Iterator[tuple[str, LogChannel]]:
     columns, times = kept_columns(plans[0].table, plans, scans)
     for one, values in zip(plans, columns, strict=True):
         key = (one.stamps, one.time_unit)
-        yield one.name, _channel(one, values, times.get(key), scans[key].result() if key in scans else None)
+        clock = scans[key].result() if key in scans and not scans[key].broken else None
+        yield one.name, _channel(one, values, times.get(key), clock)
 
 
 def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
     """Return what looks at the stamps of channels of one group, by column and unit."""
     keys = {(one.stamps, one.time_unit) for one in plans}
-    return {(i, unit): StampScan(plans[0].table, i, unit) for i, unit in keys if i is not None}
+    used = {(one.stamps, one.time_unit) for one in plans if one.time_said}
+    return {
+        (i, unit): StampScan(plans[0].table, i, unit, needed=(i, unit) in used) for i, unit in keys if i is not None
+    }
 
 
 def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, clock: TimeBase | None) -> LogChannel:
@@ -184,6 +188,11 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
     if stamps is not None and clock is not None and is_sparse(numbers):
         table, numbers, stamps, clock = _own_rows(table, numbers, stamps, clock)
         notes.append(f"{one.label} has a value in fewer than half of the rows: the others are left out")
+    if one.average > 1 and numbers.size < FEWEST:
+        message = (
+            f"expected at least {FEWEST} means of {one.average} samples, got {numbers.size}: take fewer for a mean"
+        )
+        raise refusal(table.path, message, "--average")
     if clock is not None and one.average > 1:
         refuse_uneven(table, clock)
         notes.append(f"means of {one.average} samples of {clock.rate_hz:.6g} Hz")
@@ -208,7 +217,8 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
 
 def is_sparse(numbers: NDArray[np.float64]) -> bool:
     """Return whether most values are missing, as those of a slow sensor are in the rows of a quick one."""
-    return 2 * int(np.count_nonzero(np.isnan(numbers))) > numbers.size
+    n_missing = int(np.count_nonzero(np.isnan(numbers)))
+    return numbers.size // 2 < n_missing < numbers.size
 
 
 def _own_rows(

@@ -116,3 +116,8 @@ class Selection:
         """The options of a single column that were given."""
         names = ("unit", "scale", "kind", "rate", "time", "time_unit")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]
+
+    @property
+    def of_files(self) -> list[str]:
+        """The options that were given and make no sense of a run folder."""
+        return ["--map"] * (self.map is not None) + ["--average"] * (self.average is not None) + self.given

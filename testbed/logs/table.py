@@ -39,6 +39,11 @@ class TableColumn:
     n_time: int | None = None
     rate_hz: float | None = None
 
+    def __post_init__(self) -> None:
+        # A name is printed: a control character in it would act on the terminal.
+        for key in ("name", "unit", "group"):
+            object.__setattr__(self, key, "".join(c if c.isprintable() else "?" for c in getattr(self, key)))
+
     @property
     def short(self) -> str:
         """Name within its group."""

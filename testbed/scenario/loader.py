@@ -293,9 +293,8 @@ class _Reader:
             self._bound(bounds, subject, metric, (*key, length), text)
 
     def _bound(self, bounds: list[Bound], subject: str, metric: str, key: Key, text: Any) -> None:
-        match = _BOUND.fullmatch(text) if isinstance(text, str) else None
         try:
-            bounds.append(Bound(subject, metric, *_relation(match)))
+            bounds.append(read_bound(subject, metric, text))
         except ValueError:
             self._doc.find(key, f"expected a bound such as '< 0.0143', got {quoted(text)}")
 
@@ -305,6 +304,19 @@ def at_temperature(sensor: Sensor, temperature: float) -> Sensor:
     if "temperature" not in type(sensor).model_fields or "temperature" in sensor.model_fields_set:
         return sensor
     return sensor.model_copy(update={"temperature": temperature})
+
+
+def read_bound(subject: str, metric: str, text: Any) -> Bound:
+    """Return the bound that a text such as ``< 0.5`` sets; ValueError if it is none.
+
+    Parameters
+    ----------
+    subject, metric : str
+        On what.
+    text : Any
+        As it stands in a file.
+    """
+    return Bound(subject, metric, *_relation(_BOUND.fullmatch(text) if isinstance(text, str) else None))
 
 
 def _relation(match: re.Match[str] | None) -> tuple[str, float]:

@@ -74,3 +74,25 @@ def test_a_hundred_microseconds_are_found(folder):
     found = testbed.line_of_sight(folder, LATE)["wideband"].delay_us
     print("planted 100 us, found", found)
     assert_allclose(found, 100.0, atol=20.0)
+
+
+@pytest.mark.slow
+def test_the_answer_of_the_page_is_that_of_the_scenarios():
+    """docs/pointing.md: the satellite's link, and the same with fades."""
+    folder = SCENARIO.parent / "pointing"
+    link = testbed.run(folder / "satellite_link.yaml").metrics.pointing
+    kalman, fixed = link["kalman"], link["complementary"]
+    assert_allclose([kalman.tracker_only_rms_urad, kalman.residual_rms_urad], [4.20, 0.155], rtol=0.01)
+    assert_allclose(kalman.rpe_urad["0.1"], 0.154, rtol=0.01)
+    shares = kalman.budget.shares
+    print(shares, kalman.budget.halved_urad, fixed.residual_rms_urad, fixed.budget.shares)
+    assert_allclose([shares["knowledge"], shares["latency"]], [0.10, 0.82], atol=0.01)
+    assert_allclose(kalman.budget.halved_urad["latency"], 0.092, atol=0.002)
+    known = kalman.budget.rms_urad["knowledge"]
+    perfect = kalman.residual_rms_urad**2 * (1.0 - 2.0 * shares["knowledge"]) + known**2
+    assert_allclose(perfect**0.5, 0.143, atol=0.001)
+    assert_allclose([fixed.residual_rms_urad, fixed.budget.shares["knowledge"]], [0.49, 0.72], atol=0.01)
+    fades = testbed.run(folder / "satellite_link_fades.yaml").metrics.pointing["kalman"]
+    print(fades.residual_rms_urad, fades.tracker_only_rms_urad)
+    assert_allclose(fades.residual_rms_urad, 1.17, atol=0.05)
+    assert_allclose(fades.tracker_only_rms_urad, 29.6, atol=0.5)

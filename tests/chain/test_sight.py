@@ -6,9 +6,12 @@ import json
 
 import pytest
 from numpy.testing import assert_allclose
+from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 import testbed
+from testbed.campaigns.study import load_study
+from testbed.campaigns.sweep import open_sweep, sweep
 from testbed.cli.app import app
 from tests.chain.test_pointing import aimed
 from tests.recording.test_writer import read
@@ -91,3 +94,20 @@ def test_the_recording_has_residual_and_beam_spot(folder):
     _, spots = found["/pointing/target/kalman", "Points2D:positions"]
     residual = testbed.open_run(folder).pointing["kalman"].residual[::400]
     assert_allclose(spots.reshape(-1, 2)[:, 0], 1e6 * residual, rtol=1e-6, atol=1e-9)
+
+
+def test_a_sweep_has_the_line_of_sight_in_its_columns(tmp_path):
+    """An axis in the mirror; null for a sensor; every number that of a run."""
+    keys = aimed(duration="0.5 s", settle="0.3 s", **{"pointing.windows": ["10 ms"]}).resolved()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.dump({**keys, "expect": None}, tmp_path / "base.yaml")
+    study = {"name": "late", "base": "base.yaml", "vary": {"pointing.mirror.latency": ["0 us", "500 us"]}, "seeds": 1}
+    yaml.dump(study, tmp_path / "study.yaml")
+    rows = open_sweep(sweep(load_study(tmp_path / "study.yaml"), out=tmp_path / "out")).to_pylist()
+    found = {row["pointing.mirror.latency"]: row for row in rows if row["source"] == "kalman"}
+    assert found[0.0]["residual_rms_urad"] < found[500e-6]["residual_rms_urad"]
+    assert 0.0 < found[500e-6]["rpe_urad.0.01"] < found[500e-6]["residual_rms_urad"]
+    assert all(row["residual_rms_urad"] is None for row in rows if row["kind"] == "sensor")
+    scenario = testbed.load_scenario(tmp_path / "base.yaml").with_(**{"pointing.mirror.latency": "500 us"})
+    run = testbed.run(scenario, seed=found[500e-6]["seed"]).metrics.pointing["kalman"]
+    assert_allclose(found[500e-6]["residual_rms_urad"], run.residual_rms_urad, rtol=1e-9)

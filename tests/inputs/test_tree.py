@@ -45,6 +45,13 @@ def test_a_date_is_a_text_as_it_was_written(tmp_path):
     }
 
 
+@pytest.mark.parametrize("path", ["/proc/kmsg", "/proc/uptime"])
+def test_what_the_kernel_makes_up_is_not_waited_for(path):
+    if not os.path.exists(path):  # noqa: PTH110
+        pytest.skip("only Linux has it")
+    assert read_bytes(path, 100, "a scenario") == b""
+
+
 def test_read_yaml_gives_plain_values_and_their_lines(tmp_path):
     tree = read_yaml(written(tmp_path, "a: 1\nb:\n  - x\n  - {c: 2 s}\nd: &q [1, 2]\ne: *q\n"), "a scenario")
     assert tree.data == {"a": 1, "b": ["x", {"c": "2 s"}], "d": [1, 2], "e": [1, 2]}

@@ -130,3 +130,9 @@ def test_a_curve_has_the_colour_of_its_name_wherever_it_stands():
     assert len({forward[name] for name in ("gx", "gy", "gz", "heading")}) == 4
     assert alone.items() <= forward.items()
     assert forward["kalman"] == color_of("fusion/kalman")
+
+
+def test_a_difference_that_is_nothing_is_named():
+    record = white(4000)
+    with pytest.raises(ScenarioError, match="expected a rate that changes, all are 0 deg/s"):
+        estimate_density(difference(record, record))

@@ -84,7 +84,7 @@ def test_stamps_coarser_than_the_samples_are_told():
 def test_a_counter_that_begins_anew_goes_on():
     turn = (1 << 32) * 1000
     t = (np.arange(4000) * 1_000_000 + turn - 2_000_000_000) % turn
-    clock = scan(t, 5, wrap_ns=turn)
+    clock = scan(t, 5, wraps_ns=(turn,))
     assert (clock.wraps, clock.even, clock.gaps.count) == (1, True, 0)
     assert clock.rate_hz == pytest.approx(1000.0)
 

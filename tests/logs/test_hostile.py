@@ -6,6 +6,7 @@ import os
 import sys
 import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -182,6 +183,15 @@ def test_a_directory_and_a_missing_file_are_refused(tmp_path):
             read_log(path)
 
 
+def test_an_empty_file_is_refused_unread(tmp_path):
+    """So are those that the kernel makes up, of which some let a reader wait for ever."""
+    (tmp_path / "log.csv").touch()
+    for path in (tmp_path / "log.csv", Path("/proc/kmsg"), Path("/proc/uptime")):
+        if path.exists():
+            with pytest.raises(ScenarioError, match="expected a recording, got an empty file"):
+                read_log(path)
+
+
 @pytest.mark.slow
 def test_memory_does_not_grow_with_a_text_that_is_inspected(tmp_path):
     """A text of 4 MB and one of 80 MB; `benchmarks/bench_logs.py --long` does it with 1 GB."""
@@ -195,9 +205,7 @@ def test_memory_does_not_grow_with_a_text_that_is_inspected(tmp_path):
     assert large[3] < small[3] + 30 * 2**20
 
 
-@pytest.mark.parametrize(
-    "encoding", ["rot13", "zip", "bz2", "quopri", "hex", "base64", "undefined", "no such", "x\0y", "\ud800", "u" * 300]
-)
+@pytest.mark.parametrize("encoding", ["rot13", "zip", "bz2", "quopri", "hex", "base64", "undefined", "no such", "x\0y"])
 def test_what_is_no_encoding_of_a_text_is_refused(tmp_path, encoding):
     path = tmp_path / "log.csv"
     path.write_text("t [us],w [deg/s]\n" + "".join(f"{500 * k},{k % 7}\n" for k in range(100)))

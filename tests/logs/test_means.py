@@ -71,7 +71,7 @@ def test_lost_samples_leave_a_mean_out_where_it_has_fewer_than_four_fifths(tmp_p
 def test_what_memory_should_not_hold_is_refused_with_the_option(tmp_path, monkeypatch):
     path = log(tmp_path, SECONDS, DEG)
     monkeypatch.setattr(keeping, "MOST_KEPT", 5000)
-    with pytest.raises(ScenarioError, match="--average 100 keeps means"):
+    with pytest.raises(ScenarioError, match="--average 1000 keeps means"):
         read_log(path)
     assert read_log(path, average=100).channels["w"].values.size == 39
     with pytest.raises(ScenarioError, match="from 1 on"):
@@ -89,3 +89,12 @@ def test_the_command_says_that_these_are_means(tmp_path):
     found = json.loads(call("allan", path, "--average", "8", "--json", cwd=tmp_path).stdout)
     assert found["records"][0]["n_time"] == 499
     assert "means of 8 samples of 1000 Hz" in found["records"][0]["remarks"]
+
+
+@pytest.mark.parametrize(("average", "message"), [(0, "from 1 on, got 0"), (2000, "at least 4 means of 2000 samples")])
+def test_a_number_of_samples_that_leaves_nothing_is_refused(tmp_path, average, message):
+    with pytest.raises(ScenarioError, match=message) as caught:
+        read(log(tmp_path, SECONDS, DEG), Selection(average=average))
+    assert caught.value.problems[0].key == "--average"
+    with pytest.raises(ScenarioError, match="expected a file with it"):
+        read(tmp_path, Selection(average=10))

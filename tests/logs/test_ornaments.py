@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from testbed.logs.ornaments import find_ornaments
@@ -43,3 +45,14 @@ def test_a_plain_table_has_none(kind):
 def test_a_comma_between_columns_is_no_mark_of_thousands():
     assert find_ornaments(["1,234,567"] * 30).swaps == ()
     assert find_ornaments(["1.234,567"] * 30).swaps == ()
+
+
+@pytest.mark.parametrize("part", ["a b ", "1a", "1,234", "1.234", "x: ", "[(", "-> ", "12 ", "'1", "gx:1 dps "])
+def test_a_line_made_to_be_slow_takes_no_longer_than_another(part):
+    rows = [part * (100_000 // len(part))] * 200
+    begin = time.process_time()
+    found = find_ornaments(rows)
+    for row in rows[:5]:
+        found.off(row)
+    # A hundredth of this on an idle machine; a repetition within another took minutes.
+    assert time.process_time() - begin < 3.0

@@ -32,6 +32,7 @@ ROOMS = {
     "cli": Room(30, 20, 250, 50, TOP, "commands; the only room that prints"),
     "reproduce": Room(310, 20, 250, 50, TOP, "the papers' measurements again"),
     "campaigns": Room(590, 20, 250, 50, TOP, "many runs: sweeps, regression, design"),
+    "design": Room(870, 20, 220, 50, TOP, "a chain for a requirement"),
     "scenario": Room(30, 160, 170, 120, STAGE, "YAML, units, presets|→ validated, in SI,|and back"),
     "models": Room(
         *(270, 140, 250, 160, STAGE),

@@ -882,3 +882,48 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         x_in[:], P_in[:], Q_in[:] = x, P, Q
 
     return run
+
+
+@functools.lru_cache
+def gains_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:
+    """Return run(P, F, Q, H, R, due, started, gains, variance, std), the covariance of `kalman_kernel` without any
+    reading.
+
+    P (n, n), in Joseph form, is replaced; `due` (n_sensor, n_time) says which readings there are. `gains` (n_time,
+    n_sensor, n), `variance` (n_time, n_sensor) of the innovations and `std` (n_time,) of the rate are filled where
+    there are some. Many states with the same gaps share them.
+    """
+    core = n - n_slow
+
+    @njit(cache=True, error_model="numpy")
+    def run(P_in, F_in, Q_in, H_in, R, due, started, gains, variance, std):  # pragma: no cover
+        # No reading enters the covariance: a state and readings of zero stand for all.
+        x, moved, g, K = np.zeros(n), np.empty(n), np.empty(n), np.empty(n)
+        P, F, Q, work, H = (
+            np.empty((n, n)),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            np.empty((n_sensor, n)),
+        )
+        P[:], F[:], Q[:], H[:] = P_in, F_in, Q_in, H_in
+        reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
+        spans(F, core, n, reach)
+        spans(H, 0, core, seen[:, :2])
+        spans(H, core, n, seen[:, 2:])
+        for k in range(std.size):
+            if started:
+                predict(x, P, F, Q, reach, work, moved, n, core)
+            for i in range(n_sensor):
+                if due[i, k]:
+                    variance[k, i] = innovation(x, P, H, seen, i, 0.0, g, n, core)[1] + R[i]
+                    started = True
+            for i in range(n_sensor):
+                if due[i, k]:
+                    update(x, P, H, seen, i, 0.0, R[i], g, K, n, core)
+                    for j in range(n):
+                        gains[k, i, j] = K[j]
+            std[k] = np.sqrt(P[0, 0])
+        P_in[:] = P
+
+    return run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -77,11 +78,10 @@ class ArrayTable:
         shape, dtype = data.shape, data.dtype
         if dtype.names:
             for name in dtype.names:
-                if dtype[name].kind in "iufbM" and not dtype[name].shape:
-                    label = f"{column.name}/{name}" if column.name else name
-                    part = lambda i, k, name=name: data[i:k][name]
-                    self.add(TableColumn(label, "", column.name or column.group, shape[0]), part)
+                self._add_field(column, name, data)
             return
+        if dtype.kind == "c":
+            self.notes.append(f"{column.name!r} was left out: complex numbers; save their parts")
         if dtype.kind not in "iufbM" or len(shape) > 2 or not shape:
             return
         long = [axis for axis in range(len(shape)) if shape[axis] > 1] or [0]
@@ -94,6 +94,18 @@ class ArrayTable:
             name = column.name if n_parts == 1 else f"{column.name}[{i}]" if column.name else f"column {i + 1}"
             single = replace(column, name=name or "column 1", n_time=shape[axis])
             self.add(single, _component(data, len(shape), axis, i))
+
+    def _add_field(self, column: TableColumn, name: str, data: Any) -> None:
+        """Add a field of the records of an array, or each component of one that has several."""
+        kind = data.dtype[name]
+        label, group = f"{column.name}/{name}" if column.name else name, column.name or column.group
+        if kind.base.kind not in "iufbM" or len(kind.shape) > 1 or math.prod(kind.shape) > _MOST_COMPONENTS:
+            return
+        for i in range(kind.shape[0] if kind.shape else 1):
+            place = (slice(None), i) if kind.shape else slice(None)
+            short = f"{label}[{i}]" if kind.shape and kind.shape[0] > 1 else label
+            part = lambda start, stop, place=place: data[start:stop][name][place]
+            self.add(TableColumn(short, "", group, data.shape[0]), part)
 
     def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
         """Yield the wanted columns block by block; ScenarioError if the file claims far more than it can hold."""

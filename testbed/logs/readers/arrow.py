@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _BLOCK = 1 << 20
 _MOST_FOOTER = 16 << 20
+_MOST_COMPONENTS = 64
 
 
 class ArrowTable:
@@ -47,8 +48,14 @@ class ArrowTable:
             self._file, schema, n_time = self._open(kind)
         if len(schema) > MOST_COLUMNS:
             raise refusal(path, f"expected at most {MOST_COLUMNS} columns, got {len(schema)}: write one sample a row")
-        self._names = [field.name for field in schema if _is_number(field.type)]
-        self.columns = [TableColumn(name, _unit(schema.field(name)), "", n_time) for name in self._names]
+        self._parts = [part for field in schema for part in _parts(field)]
+        if len(self._parts) > MOST_COLUMNS:
+            raise refusal(
+                path, f"expected at most {MOST_COLUMNS} columns, got {len(self._parts)}: write one sample a row"
+            )
+        self.columns = [TableColumn(name, unit, "", n_time) for name, unit, _ in self._parts]
+        odd = [field.name for field in schema if not any(_parts(field)) and not _is_word(field.type)]
+        self.notes += [f"{name!r} was left out: its type holds no column of numbers" for name in odd]
         self.header = {
             k.decode(errors="replace"): v.decode(errors="replace") for k, v in (schema.metadata or {}).items()
         }
@@ -58,14 +65,12 @@ class ArrowTable:
         import pyarrow as pa
 
         guard(self.path, self.format, 8 * len(wanted) * (self.columns[0].n_time or 0))
-        names = [self._names[i] for i in wanted]
+        ways = {i: self._parts[i][2] for i in wanted}
+        names = list(dict.fromkeys(way[0] for way in ways.values()))
         with damage_refused(self.path, self.format, pa.ArrowException, OSError):
             for batch in self._batches(names):
                 if batch.num_rows:
-                    yield {
-                        i: _array(batch.column(batch.schema.get_field_index(n)), i in stamps)
-                        for i, n in zip(wanted, names, strict=True)
-                    }
+                    yield {i: _array(_follow(batch, way), i in stamps) for i, way in ways.items()}
 
     def line(self, row: int) -> int | None:
         """Return None: there are no lines."""
@@ -97,6 +102,37 @@ class ArrowTable:
                 yield self._file.get_batch(i)
 
 
+def _parts(field: Any) -> list[tuple[str, str, tuple[Any, ...]]]:
+    """Return name, unit and way of each column of numbers in a field: in a structure, in lists of one length."""
+    import pyarrow as pa
+
+    kind = field.type
+    if _is_number(kind):
+        return [(field.name, _unit(field), (field.name,))]
+    if pa.types.is_struct(kind):
+        inner = [part for i in range(kind.num_fields) for part in _parts(kind.field(i))]
+        return [(f"{field.name}.{name}", unit, (field.name, *way)) for name, unit, way in inner]
+    if pa.types.is_fixed_size_list(kind) and _is_number(kind.value_type) and kind.list_size <= _MOST_COMPONENTS:
+        return [(f"{field.name}[{i}]", _unit(field), (field.name, i)) for i in range(kind.list_size)]
+    return []
+
+
+def _follow(batch: Any, way: tuple[Any, ...]) -> Any:
+    """Return the column that a way through structures and lists leads to."""
+    import pyarrow.compute as pc
+
+    column = batch.column(batch.schema.get_field_index(way[0]))
+    for step in way[1:]:
+        column = pc.list_element(column, step) if isinstance(step, int) else pc.struct_field(column, step)
+    return column
+
+
+def _is_word(kind: Any) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_null(kind))
+
+
 def _is_number(kind: Any) -> bool:
     import pyarrow as pa
 
@@ -104,6 +140,8 @@ def _is_number(kind: Any) -> bool:
         pa.types.is_integer(kind)
         or pa.types.is_floating(kind)
         or pa.types.is_timestamp(kind)
+        or pa.types.is_duration(kind)
+        or pa.types.is_decimal(kind)
         or pa.types.is_boolean(kind)
     )
 
@@ -118,5 +156,10 @@ def _array(column: Any, stamp: bool) -> NDArray[Any]:
 
     if pa.types.is_timestamp(column.type):
         column = column.cast(pa.timestamp("ns"))
+    if pa.types.is_duration(column.type):
+        # Since the start: a date of 1970, as times of day are.
+        column = column.cast(pa.duration("ns")).cast(pa.int64()).cast(pa.timestamp("ns"))
+    if pa.types.is_decimal(column.type):
+        column = column.cast(pa.float64())
     values = column.to_numpy(zero_copy_only=False)
     return exact(values) if stamp else np.asarray(values, np.float64)

@@ -13,16 +13,16 @@ from testbed.logs.table import TableColumn
 if TYPE_CHECKING:
     from pathlib import Path
 
-KIND = "MATLAB 5"
 
-
-def open_mat(path: Path) -> ArrayTable:
-    """Return the numeric variables of a MAT 5 file.
+def open_mat(path: Path, kind: str) -> ArrayTable:
+    """Return the numeric variables of a MAT file of version 4 or 5.
 
     Parameters
     ----------
     path : Path
         The file.
+    kind : str
+        What it is called: MATLAB 4 or 5.
 
     Returns
     -------
@@ -36,11 +36,11 @@ def open_mat(path: Path) -> ArrayTable:
     """
     from scipy.io import loadmat, whosmat
 
-    with damage_refused(path, KIND):
+    with damage_refused(path, kind):
         shapes = whosmat(path)
-        guard(path, KIND, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in shapes))
+        guard(path, kind, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in shapes))
         content = loadmat(path, squeeze_me=True, struct_as_record=True)
-    table = ArrayTable(path, KIND)
+    table = ArrayTable(path, kind)
     for name, value in content.items():
         if not name.startswith("__"):
             _add(table, name, value, "")

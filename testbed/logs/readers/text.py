@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from testbed.errors import quoted
-from testbed.logs.dialect import CLOCK, COMMENTS, HEAD, ISO, Dialect, find_dialect, word_pattern
+from testbed.logs.cells import CLOCK, COMMENTS, ISO
+from testbed.logs.dialect import HEAD, Dialect, find_dialect, word_pattern
 from testbed.logs.options import refusal
 from testbed.logs.selection import TextOptions
 from testbed.logs.table import TableColumn
@@ -74,6 +75,7 @@ class TextTable:
         self._drop, self._dropped = said.drop_faulty, Dropped()
         self.said = said
         self.unreadable = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind == "text")
+        self.dated = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind in {"iso", "clock"})
         self.format = f"text: {self.dialect}"
         self.header = self.dialect.preamble
         self.columns = self._columns()
@@ -84,17 +86,27 @@ class TextTable:
         self.notes, self._dropped = [], Dropped()
         types = self._types(wanted, stamps)
         line = 1
-        for raw, last in self._raw():
+        for block_of_bytes, last in self._raw():
+            raw = block_of_bytes.replace(b"\0", b"") if self._drop else block_of_bytes
             if b"\0" in raw:
                 where = line + raw.count(b"\n", 0, raw.index(b"\0"))
-                self._refuse("cannot be read: a NUL byte, as a file has that was cut while written; remove it", where)
+                what = "cannot be read: a NUL byte, as a file has that was cut while written"
+                self._refuse(f"{what}; remove it, or --drop-faulty", where)
             content = self._clean(raw, line)
             if content.strip():
-                block = self._parse(content, types, line, raw, last=last)
+                block = self._timed(self._parse(content, types, line, raw, last=last), stamps)
                 if next(iter(block.values())).size:
                     yield block
             line += raw.count(b"\n")
         self.notes += self._dropped.said()
+
+    def _timed(self, block: Block, stamps: Collection[int]) -> Block:
+        """Return the rows that have a time, where faulty ones are to be left out; else all."""
+        if not (self._drop and stamps):
+            return block
+        known = np.logical_and.reduce([_known(block[i]) for i in stamps])
+        self._dropped.count(int(np.count_nonzero(~known)), "no time")
+        return block if known.all() else {i: values[known] for i, values in block.items()}
 
     def line(self, row: int) -> int | None:
         """Return the line of a row, counted from 0."""
@@ -112,7 +124,7 @@ class TextTable:
 
     def _raw(self) -> Iterator[tuple[bytes, bool]]:
         """Yield blocks of whole lines in UTF-8, and whether it is the last."""
-        utf16 = self.dialect.encoding.startswith("utf-16")
+        utf16 = self.dialect.encoding.startswith(("utf-16", "utf-32"))
         decoder = codecs.getincrementaldecoder(self.dialect.encoding)() if utf16 else None
         rest, pending = b"", None
         with self.path.open("rb") as stream:
@@ -248,6 +260,8 @@ class TextTable:
         """Return what is wrong with a row; empty if nothing."""
         dialect = self.dialect
         fields = dialect.fields(text)
+        if text.count('"') % 2:
+            return f"expected quotes in pairs, got {text.strip()[:60]!r}; mend or remove the line, or --drop-faulty"
         if len(fields) != dialect.n_columns:
             got = f"expected {dialect.n_columns} fields ({dialect}), got {len(fields)}: {text.strip()[:60]!r}"
             return f"{got}; mend or remove the line, or --drop-faulty, or --only WORD that all rows hold"
@@ -309,16 +323,27 @@ class Dropped:
         for row in content.split(b"\n"):
             text = row.decode(errors="replace")
             if text.strip() and fault(text):
-                self._count += 1
-                self._first = self._first or text.strip()[:60]
+                self.count(1, text.strip()[:60])
             else:
                 kept.append(row)
         return b"\n".join(kept)
+
+    def count(self, n: int, first: str) -> None:
+        """Count lines that were left out."""
+        if n:
+            self._count += n
+            self._first = self._first or first
 
     def said(self) -> list[str]:
         """Return how many there were, and the first."""
         first = f"{self._count} lines that are not like the others were left out, the first {self._first!r}"
         return [first] if self._count else []
+
+
+def _known(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which stamps are there."""
+    missing: NDArray[np.bool_] = np.isnat(values) if values.dtype.kind == "M" else ~np.isfinite(values)
+    return ~missing
 
 
 def _plain(column: Any) -> NDArray[Any]:

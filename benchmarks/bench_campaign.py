@@ -1,0 +1,95 @@
+"""A campaign: what a further seed costs, and a step of filters side by side in lanes.
+
+CPU seconds of `testbed.evaluate` on the mixed scenario (20 s, three filters, modal plant) with 2 and with 34 seeds: the
+difference is what a further seed costs, and 1000 seeds are extrapolated from both. Lanes: nanoseconds per lane and
+step, of filters that share one covariance and of filters that have their own. Run:
+python benchmarks/bench_campaign.py [--seeds 34]
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from copy import deepcopy
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from promises import Promise, conclude
+
+import testbed
+from testbed.fusion import FILTERS
+from testbed.fusion.belief import default_belief
+from testbed.fusion.lanes.source import LANES
+from testbed.fusion.lanes.together import Together
+from testbed.parts import resolve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+SCENARIO = Path(__file__).parents[1] / "scenarios" / "mixed_0p5hz_10hz.yaml"
+RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
+N_TIME = 20_000
+# As `testbed.evaluate` has them: 128 seeds together, which share what they can.
+PACKS = 8
+
+
+def seconds(task: Callable[[], object], repeats: int) -> float:
+    """Return the least CPU time of some runs [s]: what else the machine does only ever adds."""
+    times = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        task()
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> float:
+    """Return nanoseconds per lane and step, the readings being spread and gated already."""
+    kind = resolve("filter", name, FILTERS)
+    first = kind(belief, RATES, kind.Parameters(**parameters))
+    filters, rng = [deepcopy(first) for _ in range(PACKS * LANES)], np.random.default_rng(1)
+    given = [
+        {sensor: 1e-4 * rng.standard_normal(round(N_TIME * rate / 20_000.0)) for sensor, rate in RATES.items()}
+        for _ in filters
+    ]
+    lanes = Together(first)._lanes
+    assert lanes is not None
+    received = [one.received(values) for one, values in zip(filters, given, strict=True)]
+
+    def task() -> None:
+        lanes.advance(filters, received, range(len(filters)))
+
+    task()
+    return 1e9 * seconds(task, 7) / (N_TIME * len(filters))
+
+
+def main() -> None:
+    """Print the costs and the promises."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=34)
+    most = parser.parse_args().seeds
+    scenario = testbed.load_scenario(SCENARIO).with_(**{"turntable.engine": "modal"})
+    coloured = scenario.with_(**{"fusion.kalman": {"belief": "exact"}}).fusion["kalman"].belief
+    testbed.evaluate(scenario.with_(duration="2 s", settle="1 s"), range(2))
+    few = seconds(lambda: testbed.evaluate(scenario, range(2)), 2)
+    many = seconds(lambda: testbed.evaluate(scenario, range(most)), 2)
+    further = (many - few) / (most - 2)
+    # A truth is played once for 128 seeds.
+    thousand = 1000 * further + np.ceil(1000 / 128) * max(few - 2 * further, 0.0)
+    print(f"2 seeds {few:.3f} CPU s, {most} seeds {many:.3f} CPU s; 1000 seeds are extrapolated")
+    conclude(
+        Promise("a further seed x 3 filters x 20 s, modal plant [CPU s]", 0.06, further),
+        Promise("1000 seeds x 3 filters x 20 s, modal plant, extrapolated [CPU s]", 60.0, float(thousand)),
+        Promise(
+            "lane-step with a shared covariance, 5 states [ns]",
+            3.0,
+            lane_ns("kalman", default_belief(), coloured=False),
+        ),
+        Promise("lane-step with a shared covariance, coloured noise [ns]", 15.0, lane_ns("kalman", coloured)),
+        Promise("lane-step with its own covariance, shakf, 5 states [ns]", 8.0, lane_ns("shakf", default_belief())),
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""What is asked of a line of sight, and the parts that it may be made of, each with its cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from testbed.document import Document
+from testbed.errors import quoted
+from testbed.inputs.plugins import load_plugins
+from testbed.inputs.tree import Tree, read_yaml
+from testbed.pointing.parameters import Mirror, Tracker, Window, window_key
+from testbed.scenario.intake import Intake
+from testbed.scenario.loader import read_bound, read_document
+from testbed.units import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from testbed.parts import Part
+    from testbed.scenario.model import Bound, Scenario
+
+_WHAT = "requirement (name, duration, motion, sensors, fusion, trackers, mirrors, rpe_urad, ...)"
+_WINDOWED = ("rpe_urad", "mpe_urad")
+_ASKED = (*_WINDOWED, "residual_rms_urad")
+_COST = "cost"
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """What is asked, and of what it may be made.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Disturbance, all sensors and all filters, on an ideal table.
+    trackers, mirrors : mapping of str to Tracker, to Mirror
+        By name.
+    bounds : tuple of Bound
+        What has to be met; the subject is empty.
+    costs : mapping
+        Of each part by its kind and name, such as ``("sensors", "mhd_ars")``.
+    written : mapping
+        The parts as they stand in the file, without costs.
+    """
+
+    scenario: Scenario
+    trackers: Mapping[str, Tracker]
+    mirrors: Mapping[str, Mirror]
+    bounds: tuple[Bound, ...]
+    costs: Mapping[tuple[str, str], float]
+    written: Mapping[str, Any]
+
+    @property
+    def windows(self) -> tuple[Window, ...]:
+        """Every window that is asked for."""
+        lengths = {bound.metric.partition(".")[2] for bound in self.bounds} - {""}
+        return tuple(Window(length=float(length)) for length in sorted(lengths, key=float))
+
+
+def read_requirement(path: str | Path, *, plugins: Iterable[str] = ()) -> Requirement:
+    """Read and validate a requirement.
+
+    Parameters
+    ----------
+    path : str or Path
+        A YAML file with the keys of a scenario, whose sensors and filters are those to choose from, each with its
+        `cost`; `trackers` and `mirrors` likewise, and bounds such as ``rpe_urad: {100 ms: "< 0.5"}``.
+    plugins : iterable of str, optional
+        As for `load_scenario`.
+
+    Raises
+    ------
+    ScenarioError
+        With every finding at once.
+    """
+    tree = read_yaml(Path(path), "a requirement")
+    document = Document(path, _WHAT, tree)
+    data = dict(document.data)
+    bounds = _bounds(document, {key: data.pop(key) for key in _ASKED if key in data})
+    costs: dict[tuple[str, str], float] = {}
+    written = {
+        kind: _without_costs(document, kind, data.pop(kind, None), costs)
+        for kind in ("sensors", "fusion", "trackers", "mirrors")
+    }
+    folder = Path(path).resolve().parent
+    trackers = _parts(document, Tracker, "trackers", written["trackers"], folder)
+    mirrors = _parts(document, Mirror, "mirrors", written["mirrors"], folder)
+    document.refuse()
+    written["frame"] = {"turntable": {"mode": "ideal"}, **data}
+    whole = {**written["frame"], "sensors": written["sensors"], "fusion": written["fusion"]}
+    inner = Document(path, _WHAT, Tree(whole, tree.lines))
+    scenario = read_document(Intake(inner, folder, load_plugins(plugins)))
+    return Requirement(scenario, trackers, mirrors, bounds, costs, written)
+
+
+def _bounds(document: Document, asked: Mapping[str, Any]) -> tuple[Bound, ...]:
+    found = []
+    for metric, entry in asked.items():
+        windows = _mapping(document, metric, entry) if metric in _WINDOWED else {"": entry}
+        for window, text in windows.items():
+            place = (metric, window) if window else (metric,)
+            try:
+                found.append(read_bound("", _named(metric, str(window)), text))
+            except ValueError as error:
+                document.find(place, str(error) or f"expected a bound such as '< 0.5', got {quoted(text)}")
+    if not asked:
+        document.find((), f"nothing is asked: give a bound such as rpe_urad: {{100 ms: '< 0.5'}} ({', '.join(_ASKED)})")
+    return tuple(found)
+
+
+def _named(metric: str, window: str) -> str:
+    """Return the name of a metric, with the window's length in seconds; ValueError if that is none."""
+    return f"{metric}.{window_key(parse(window, 's', example='100 ms'))}" if window else metric
+
+
+def _mapping(document: Document, kind: str, given: Any) -> dict[str, Any]:
+    if isinstance(given, dict):
+        return given
+    document.find((kind,), f"expected a mapping, got {quoted(given)}")
+    return {}
+
+
+def _without_costs(
+    document: Document, kind: str, given: Any, costs: dict[tuple[str, str], float]
+) -> dict[str, dict[str, Any]]:
+    """Return the parts of a kind without their costs, which are noted."""
+    parts = {}
+    for name, entry in _mapping(document, kind, {} if given is None else given).items():
+        part = dict(_mapping(document, f"{kind}.{name}", {} if entry is None else entry))
+        cost = part.pop(_COST, 0.0)
+        if isinstance(cost, bool) or not isinstance(cost, int | float) or not cost >= 0.0:
+            document.find((kind, name, _COST), f"expected a number of at least 0, got {quoted(cost)}")
+            cost = 0.0
+        costs[kind, str(name)] = float(cost)
+        parts[str(name)] = part
+    if not parts:
+        document.find((kind,), f"there is nothing to choose from: name at least one of '{kind}:'")
+    return parts
+
+
+def _parts(document: Document, model: type[Part], kind: str, given: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    read = {name: document.validate(model, entry, (kind, name), folder) for name, entry in given.items()}
+    return {name: part for name, part in read.items() if part is not None}

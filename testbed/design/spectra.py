@@ -1,0 +1,142 @@
+r"""What a chain leaves of a disturbance, frequency by frequency, without playing it.
+
+.. math:: P_e = |S|^2 \left[ \left| \frac{1 - M e^{-s \tau} (1 + t_{lead} s) T}{s} \right|^2 P_\omega
+    + \left| \frac{M (1 + t_{lead} s)}{s} \right|^2 \sum_i |H_i|^2 S_i \right] + |1 - S|^2 r^2
+
+with the rate's spectrum P of one realisation of the disturbance and the densities S of the readings' noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.pointing.windows import Periodogram, mpe_weight, rpe_weight, weighted_rms
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.design.response import FilterResponse
+    from testbed.pointing.blend import Gains
+    from testbed.pointing.parameters import Mirror
+    from testbed.scenario.model import Scenario
+    from testbed.sensors.base import Sensor
+    from testbed.signals import FloatArray
+
+_URAD = 1e6
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A rate's spectrum.
+
+    Parameters
+    ----------
+    freq_hz, power : ndarray, shape (n_freq,)
+        Frequencies above zero [Hz] and the share of the mean square at each [rad^2/s^2].
+    """
+
+    freq_hz: FloatArray
+    power: FloatArray
+
+    @property
+    def step_hz(self) -> float:
+        """From one frequency to the next [Hz]."""
+        return float(self.freq_hz[0])
+
+
+def disturbance(scenario: Scenario) -> Disturbance:
+    """Return the spectrum of the motion that a scenario commands, after settle.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of which the table is ideal: the truth is the command.
+    """
+    base, profile = scenario.base_rate_hz, scenario.profile()
+    first = round(scenario.frame.settle * base)
+    spectrum = Periodogram(base, scenario.n_time - first, longest=scenario.n_time)
+    spectrum.process(profile.rate(np.arange(first, scenario.n_time) / base))
+    return Disturbance(spectrum.freq_hz[1:], spectrum.power[1:])
+
+
+def reading_noise(sensors: Mapping[str, Sensor], freq_hz: FloatArray) -> dict[str, FloatArray]:
+    """Return the two-sided density of the noise of each sensor's readings [rad^2/s], shape (n_freq,).
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+        The instruments.
+    freq_hz : ndarray, shape (n_freq,)
+        Where, rising [Hz].
+    """
+    coarse = np.geomspace(freq_hz[0], freq_hz[-1], 400)
+    found = {}
+    for name, sensor in sensors.items():
+        gain = np.abs(sensor.response(coarse)) ** 2
+        seen = gain > 0.0
+        density = np.where(seen, sensor.input_noise_psd(coarse) * gain, 0.0) if sensor.noise else np.zeros(coarse.size)
+        found[name] = np.interp(freq_hz, coarse, np.where(np.isfinite(density), density, 0.0))
+    return found
+
+
+def error_power(
+    shake: Disturbance,
+    response: FilterResponse,
+    noise: Mapping[str, FloatArray],
+    mirror: Mirror,
+    gains: Gains,
+    tracker_noise: float,
+) -> FloatArray:
+    """Return the share of the residual's mean square at each frequency of the disturbance [rad^2], shape (n_freq,).
+
+    Parameters
+    ----------
+    shake : Disturbance
+        The true rate.
+    response : FilterResponse
+        Of the filter.
+    noise : mapping of str to ndarray, shape (n_freq,)
+        Two-sided density of the readings of each sensor [rad^2/s].
+    mirror : Mirror
+        The way of the command.
+    gains : Gains
+        Of the tracker.
+    tracker_noise : float
+        r [rad/sqrt(Hz)].
+    """
+    freq = shake.freq_hz
+    s = 2j * np.pi * freq
+    passed = mirror.dynamics.response(freq) * np.exp(-s * mirror.latency) * (1.0 + sum(mirror.lead_times) * s)
+    if mirror.rate is not None:
+        passed = passed * np.sinc(freq / mirror.rate) * np.exp(-0.5 * s / mirror.rate)
+    S = gains.sensitivity(freq)
+    T = 1.0 + response.at(response.error, freq)
+    signal = np.abs(S * (1.0 - passed * T) / s) ** 2 * shake.power
+    density = np.sum(
+        [np.abs(response.at(response.noise[name], freq)) ** 2 * one for name, one in noise.items()], axis=0
+    )
+    drawn = np.abs(S * passed / s) ** 2 * density + np.abs(1.0 - S) ** 2 * tracker_noise**2
+    power: FloatArray = signal + 2.0 * shake.step_hz * drawn
+    return power
+
+
+def errors_of(power: FloatArray, shake: Disturbance, metric: str) -> float:
+    """Return a metric of pointing from the residual's spectrum [urad].
+
+    Parameters
+    ----------
+    power : ndarray, shape (n_freq,)
+        As `error_power` has it [rad^2].
+    shake : Disturbance
+        Of that frequencies.
+    metric : str
+        ``residual_rms_urad``, or ``rpe_urad`` and ``mpe_urad`` with the window's length behind a dot.
+    """
+    name, _, window = metric.partition(".")
+    weight = {"rpe_urad": rpe_weight, "mpe_urad": mpe_weight}.get(name)
+    return _URAD * (
+        weighted_rms(power) if weight is None else weighted_rms(power, weight(shake.freq_hz, float(window)))
+    )

@@ -1,0 +1,1 @@
+"""Filters under many seeds side by side: what they share is computed once, the rest lane by lane."""

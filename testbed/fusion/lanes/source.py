@@ -1,0 +1,329 @@
+"""Straight-line source of the kernels of lanes, which the compiler turns into vector instructions.
+
+Everything that a lane has stands in one array W (n_row, LANES), one row per number, and the innermost loop runs over
+the lanes. States, covariance and matrices are plain variables in it, zeros of F and H left out: no index to compute, no
+array that could be another one. What comes out is written lane beside lane: single numbers, one to each lane's own
+array, would take as long as all the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+# Lanes of a pack: two vectors of eight. What is left of a pack is padded.
+LANES = 16
+# A reading that many standard deviations off fires the gate, as in `testbed.fusion.kernels.covariance`.
+GATE = 1000.0
+# What a lane remembers of a sensor, in this order; see `testbed.fusion.kernels.covariance.SENSOR`.
+MEMORY = ("R", "lowest", "highest", "hits", "innovation", "reading", "increment", "window", "band")
+_HEAD = """\
+from math import sqrt
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def run({arguments}):
+"""
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Where the matrices of a model are not zero.
+
+    Parameters
+    ----------
+    F, H : tuple of tuple of int
+        Columns that are not zero, by row.
+    """
+
+    F: tuple[tuple[int, ...], ...]
+    H: tuple[tuple[int, ...], ...]
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.F)
+
+
+@dataclass
+class Workspace:
+    """Rows of W by name, in the order in which they were asked for.
+
+    Parameters
+    ----------
+    names : list of str
+        Their names.
+    """
+
+    names: list[str] = field(default_factory=list)
+
+    def at(self, name: str) -> str:
+        """Return the element of a row in the present lane."""
+        if name not in self.names:
+            self.names.append(name)
+        return f"W[{LANES * self.names.index(name)} + s]"
+
+
+def state_names(n: int) -> list[str]:
+    """Return the rows of the states.
+
+    Parameters
+    ----------
+    n : int
+        How many.
+    """
+    return [f"x{i}" for i in range(n)]
+
+
+def covariance_names(n: int) -> list[str]:
+    """Return the rows of the lower half of P, row after row.
+
+    Parameters
+    ----------
+    n : int
+        States.
+    """
+    return [_p(i, j) for i in range(n) for j in range(i + 1)]
+
+
+def memory_names(n_sensor: int) -> list[str]:
+    """Return the rows of what a lane remembers of its sensors, one sensor after the other.
+
+    Parameters
+    ----------
+    n_sensor : int
+        Sensors.
+    """
+    return [f"{name}_{i}" for i in range(n_sensor) for name in MEMORY]
+
+
+def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
+    """Return the source of run(F, H, W, gains, variance, due, started, Z, rate, innovation), and the rows of its W.
+
+    States of lanes that share one covariance: `gains` (n_time, n_sensor, n) and `variance` (n_time, n_sensor) belong to
+    the readings that are `due` (n_sensor, n_time). Z is (n_sensor, LANES, n_time), `innovation` (n_sensor, n_time,
+    LANES), `rate` (n_time, LANES). The row ``worst`` holds the largest squared innovation over that of the gate.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Of F and H.
+    """
+    n, rows = pattern.n, Workspace(state_names(pattern.n))
+    sensors = range(len(pattern.H))
+    text = _HEAD.format(arguments="F, H, W, gains, variance, due, started, Z, rate, innovation")
+    lines = [*_matrices(pattern), f"    for s in range({LANES}):", f"        {rows.at('worst')} = 0.0"]
+    lines += ["    for k in range(rate.shape[0]):", "        if started:", *_lanes(12, _move(pattern, rows))]
+    for i in sensors:
+        read = [f"{rows.at(f'z{i}')} = Z[{i}, s, k]"]
+        e = [
+            *_load(rows, state_names(n)),
+            f"e = {rows.at(f'z{i}')}{_seen(pattern, i)}",
+            f"innovation[{i}, k, s] = e",
+            f"{rows.at('worst')} = max({rows.at('worst')}, e * e * scale)",
+        ]
+        lines += [f"        if due[{i}, k]:", "            started = True", *_lanes(12, read)]
+        lines += [f"            scale = {1.0 / GATE**2!r} / variance[k, {i}]", *_lanes(12, e)]
+    for i in sensors:
+        gains = [f"            k{j} = gains[k, {i}, {j}]" for j in range(n)]
+        use = [*_load(rows, state_names(n)), f"e = {rows.at(f'z{i}')}{_seen(pattern, i)}"]
+        use += [f"{rows.at(f'x{j}')} = x{j} + k{j} * e" for j in range(n)]
+        lines += [f"        if due[{i}, k]:", *gains, *_lanes(12, use)]
+    lines += _lanes(8, [f"rate[k, s] = {rows.at('x0')}"])
+    return text + "\n".join(lines) + "\n", rows.names
+
+
+def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
+    """Return the source of run(F, Q, H, W, windows, common, seen, due, started, Z, rate, std, innovation, variance),
+    and the rows of its W.
+
+    The Sage-Husa family with R that adapts, a covariance per lane in Joseph form. `windows` (n_sensor, n_window, LANES)
+    holds the squared innovations of the sliding windows, `common` (n_sensor,) one SENSOR record per sensor with what
+    all lanes have in common, `seen` (n_sensor,) how many readings there were. Z is (n_sensor, LANES, n_time),
+    `innovation` and its `variance` are (n_sensor, n_time, LANES), `rate` and `std` (n_time, LANES).
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Of F and H.
+    """
+    n, n_sensor = pattern.n, len(pattern.H)
+    rows = Workspace([*state_names(n), *covariance_names(n), *memory_names(n_sensor)])
+    text = _HEAD.format(
+        arguments="F, Q, H, W, windows, common, seen, due, started, Z, rate, std, innovation, variance",
+    )
+    lines = [*_matrices(pattern), *(f"    q{i}_{j} = Q[{i}, {j}]" for i in range(n) for j in range(i + 1))]
+    lines += [f"    for s in range({LANES}):", f"        {rows.at('worst')} = 0.0", "    n_window = windows.shape[1]"]
+    lines += ["    for k in range(rate.shape[0]):", "        if started:"]
+    lines += _lanes(12, [*_move(pattern, rows), *_grow(pattern, rows)])
+    for i in range(n_sensor):
+        lines += [f"        if due[{i}, k]:", "            started = True", *_observe(pattern, rows, i)]
+    for i in range(n_sensor):
+        lines += [f"        if due[{i}, k]:", *_use(pattern, rows, i)]
+    lines += _lanes(8, [f"rate[k, s] = {rows.at('x0')}", f"std[k, s] = sqrt({rows.at(_p(0, 0))})"])
+    return text + "\n".join(lines) + "\n", rows.names
+
+
+def _p(i: int, j: int) -> str:
+    return f"p{max(i, j)}_{min(i, j)}"
+
+
+def _lanes(indent: int, body: Iterable[str]) -> list[str]:
+    """Return a loop over the lanes."""
+    return [f"{' ' * indent}for s in range({LANES}):", *(f"{' ' * indent}    {line}" for line in body)]
+
+
+def _load(rows: Workspace, names: Iterable[str]) -> Iterator[str]:
+    return (f"{name} = {rows.at(name)}" for name in names)
+
+
+def _matrices(pattern: Pattern) -> Iterator[str]:
+    """Yield F and H as plain variables."""
+    for name, matrix in (("f", pattern.F), ("h", pattern.H)):
+        for i, row in enumerate(matrix):
+            yield from (f"    {name}{i}_{j} = {name.upper()}[{i}, {j}]" for j in row)
+
+
+def _sum(terms: Iterable[str]) -> str:
+    return " + ".join(terms) or "0.0"
+
+
+def _seen(pattern: Pattern, i: int) -> str:
+    """Return - H_i x, term by term."""
+    return "".join(f" - h{i}_{j} * x{j}" for j in pattern.H[i])
+
+
+def _move(pattern: Pattern, rows: Workspace) -> list[str]:
+    """Return x = F x."""
+    moved = [f"{rows.at(f'x{i}')} = {_sum(f'f{i}_{j} * x{j}' for j in row)}" for i, row in enumerate(pattern.F)]
+    return [*_load(rows, state_names(pattern.n)), *moved]
+
+
+def _grow(pattern: Pattern, rows: Workspace) -> list[str]:
+    """Return P = F P F' + Q."""
+    n, lines = pattern.n, list(_load(rows, covariance_names(pattern.n)))
+    lines += [f"w{i}_{j} = {_sum(f'f{i}_{m} * {_p(m, j)}' for m in pattern.F[i])}" for i in range(n) for j in range(n)]
+    lines += [
+        f"{rows.at(_p(i, j))} = q{i}_{j} + {_sum(f'w{i}_{m} * f{j}_{m}' for m in pattern.F[j])}"
+        for i in range(n)
+        for j in range(i + 1)
+    ]
+    return lines
+
+
+def _project(pattern: Pattern, i: int) -> list[str]:
+    """Return g = P H_i' and its innovation's spread."""
+    g = [f"g{j} = {_sum(f'h{i}_{m} * {_p(m, j)}' for m in pattern.H[i])}" for j in range(pattern.n)]
+    return [*g, f"spread = {_sum(f'h{i}_{j} * g{j}' for j in pattern.H[i])}"]
+
+
+def _observe(pattern: Pattern, rows: Workspace, i: int) -> list[str]:
+    """Return what `covariance.observe` does: N_k, band, R in force, S, before any reading of the instant is used."""
+    memory = {name: rows.at(f"{name}_{i}") for name in MEMORY}
+    z, one = rows.at(f"z{i}"), f"common[{i}]"
+    scalars = [
+        f"one = {one}",
+        f"fresh = seen[{i}] > 0",
+        "if fresh:",
+        "    one.increments += 1",
+        "weight = max(1.0 / max(one.increments, 1), one.least_weight) if fresh else 0.0",
+        "judged = one.banded and one.increments >= one.wait",
+        "valid = fresh or not one.difference",
+        "half, whole = (0.5, 1.0) if one.difference else (1.0, 0.0)",
+        "low, high = one.thresholds[0], one.thresholds[1]",
+        "level0, level1, level2 = one.levels[0], one.levels[1], one.levels[2]",
+        "floor, clamp = one.floor, one.clamp",
+    ]
+    lines = [f"            {line}" for line in scalars]
+    lines += _lanes(12, [f"{z} = Z[{i}, s, k]"])
+    body = [
+        *_load(rows, [*state_names(pattern.n), *covariance_names(pattern.n)]),
+        *_project(pattern, i),
+        f"e = {z}{_seen(pattern, i)}",
+        f"R = {memory['R']}",
+        f"{rows.at('worst')} = max({rows.at('worst')}, {1.0 / GATE**2!r} * e * e / (spread + R))",
+        f"step = {z} - ({memory['reading']} if fresh else {z})",
+        f"increment = {memory['increment']} + weight * (0.5 * step * step - {memory['increment']})",
+        f"{memory['reading']} = {z}",
+        f"{memory['increment']} = increment",
+        "band = (1.0 if increment >= low else 0.0) + (1.0 if increment >= high else 0.0)",
+        "level = level0 if increment < low else level1",
+        "level = level if increment < high else level2",
+        f"moved = judged and band != {memory['band']}",
+        "R = level if moved else R",
+        f"{memory['R']} = R",
+        f"{memory['lowest']} = min(R, max(floor, R / clamp)) if moved else {memory['lowest']}",
+        f"{memory['highest']} = R * clamp if moved else {memory['highest']}",
+        f"{memory['band']} = band if moved else {memory['band']}",
+        f"before = {memory['innovation']} if fresh else 0.0",
+        "square = e - whole * before",
+        f"{rows.at(f'square{i}')} = half * square * square",
+        f"{rows.at(f'spread{i}')} = spread",
+        f"{rows.at(f'used{i}')} = R",
+        f"{memory['innovation']} = e",
+        f"innovation[{i}, k, s] = e",
+        f"variance[{i}, k, s] = spread + R",
+    ]
+    lines += _lanes(12, body)
+    total, square = memory["window"], rows.at(f"square{i}")
+    slide = [
+        f"{total} = {total} + ({square} - windows[{i}, at, s])",
+        f"windows[{i}, at, s] = {square}",
+    ]
+    scale = [
+        f"mean = {total} / n_seen",
+        f"C = {rows.at(f'spread{i}')} + {memory['R']}",
+        f"{rows.at(f'used{i}')} = {rows.at(f'used{i}')} * max(1.0, alpha * mean / C)",
+    ]
+    lines += [
+        "            if one.alpha != 0.0 and valid:",
+        "                alpha, at = one.alpha, one.window_count % n_window",
+        "                one.window_count += 1",
+        "                n_seen = float(min(one.window_count, n_window))",
+        *_lanes(16, slide),
+        "                if at == n_window - 1:",
+        *_lanes(20, [f"{total} = 0.0"]),
+        "                    for b in range(n_window):",
+        *_lanes(24, [f"{total} = {total} + windows[{i}, b, s]"]),
+        *_lanes(16, scale),
+    ]
+    return lines
+
+
+def _use(pattern: Pattern, rows: Workspace, i: int) -> list[str]:
+    """Return what `covariance.update` and `covariance.learn` do: the reading is used, then R adapts."""
+    n, memory = pattern.n, {name: rows.at(f"{name}_{i}") for name in MEMORY}
+    pairs = [(a, b) for a in range(n) for b in range(n)]
+    body = [
+        *_load(rows, [*state_names(n), *covariance_names(n)]),
+        *_project(pattern, i),
+        f"R = {rows.at(f'used{i}')}",
+        f"e = {rows.at(f'z{i}')}{_seen(pattern, i)}",
+        "C = spread + R",
+        *(f"k{j} = g{j} / C" for j in range(n)),
+        *(f"{rows.at(f'x{j}')} = x{j} + k{j} * e" for j in range(n)),
+        *(f"a{a}_{b} = {_p(a, b)} - k{a} * g{b}" for a, b in pairs),
+        *(f"t{j} = {_sum(f'h{i}_{m} * a{m}_{j}' for m in pattern.H[i])} - R * k{j}" for j in range(n)),
+        *(f"{rows.at(_p(a, b))} = a{a}_{b} - t{a} * k{b}" for a, b in pairs if b <= a),
+    ]
+    learn = [
+        f"R = (1.0 - d) * {memory['R']} + d * ({rows.at(f'square{i}')} - {rows.at(f'spread{i}')})",
+        f"below, above = R < {memory['lowest']}, R > {memory['highest']}",
+        f"{memory['hits']} = {memory['hits']} + (1.0 if below or above else 0.0)",
+        f"R = {memory['lowest']} if below else R",
+        f"{memory['R']} = {memory['highest']} if above and not below else R",
+    ]
+    return [
+        *_lanes(12, body),
+        f"            one = common[{i}]",
+        f"            if one.adapt_R and (not one.difference or seen[{i}] > 0):",
+        "                one.power *= one.forget",
+        "                d = (1.0 - one.forget) / (1.0 - one.power)",
+        *_lanes(16, learn),
+        f"            seen[{i}] += 1",
+    ]

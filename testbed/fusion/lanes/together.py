@@ -1,0 +1,71 @@
+"""One filter under many seeds: as many at a time as can, each with the bits that it has alone.
+
+This room is a friend of the filters that it advances: it reads and writes their states.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.fusion.filters.kalman import Kalman
+from testbed.fusion.filters.shakf import SageHusa
+from testbed.fusion.kernels.covariance import JOSEPH
+from testbed.fusion.lanes.adaptive import AdaptiveLanes
+from testbed.fusion.lanes.shared import SharedLanes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from testbed.fusion.base import BlockFilter, EstimateBlock
+    from testbed.fusion.model_filter import ModelFilter
+    from testbed.signals import FloatArray
+
+
+class Together:
+    """Filters of one kind and setting under several seeds.
+
+    In each block, those whose readings are all there go side by side in lanes. A filter that misses a reading, whose
+    gate fires, or whose past is another than that of the rest, takes the block alone; it may be back in the next one.
+
+    Parameters
+    ----------
+    example : BlockFilter
+        One of them.
+    """
+
+    def __init__(self, example: BlockFilter) -> None:
+        self._lanes: SharedLanes | AdaptiveLanes | None = None
+        if isinstance(example, Kalman) and _plain(example):
+            self._lanes = SharedLanes(example)
+        elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
+            self._lanes = AdaptiveLanes(example)
+
+    def process(
+        self, filters: Sequence[BlockFilter], readings: Sequence[Mapping[str, FloatArray]]
+    ) -> list[EstimateBlock]:
+        """Return what each filter gives for its readings of a block.
+
+        Parameters
+        ----------
+        filters : sequence of BlockFilter
+            Some of them; they go on from where they are.
+        readings : sequence of mapping of str to ndarray
+            Of each, by sensor [rad/s].
+        """
+        received = [one.received(values) for one, values in zip(filters, readings, strict=True)]
+        done: dict[int, EstimateBlock] = {}
+        if self._lanes is not None:
+            whole = [m for m, (Z, _) in enumerate(received) if not np.isinf(Z).any()]
+            done = self._lanes.advance(filters, received, whole)
+        return [done[m] if m in done else one.estimated(*received[m]) for m, one in enumerate(filters)]
+
+
+def _plain(one: ModelFilter) -> bool:
+    """Return whether the recursion is the one that the lanes have: Joseph's form in double precision."""
+    return one._form == JOSEPH and one._x.dtype == np.float64
+
+
+def _adapts_only_R(one: SageHusa) -> bool:
+    return not one._chosen.any() and not one._sensors["adapt_offset"].any() and not one._sensors["follow"].any()

@@ -1,0 +1,157 @@
+"""A chain for a requirement: spectra against runs, the cheapest that is enough, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import testbed
+from testbed.cli.app import app
+from testbed.design.requirement import read_requirement
+from testbed.design.response import filter_response
+from testbed.design.search import chosen_scenario, search
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "satellite_link_design.yaml"
+SHORT = """\
+name: quick
+seed: 3
+duration: 6 s
+settle: 2 s
+motion:
+  - sine: {frequency: 30 Hz, angle: 20 urad}
+  - platform_psd: {spectrum: olympus, low: 1 Hz, high: 150 Hz}
+sensors:
+  mhd_ars: {preset: sx300, cost: 30}
+  mems_gyro: {preset: adis16505_filtered, cost: 1}
+fusion:
+  kalman: {belief: identified, cost: 2}
+  wideband: {belief: identified}
+trackers:
+  coarse: {bandwidth: 10 Hz, noise: 5 nrad/sqrt(Hz), cost: 5}
+mirrors:
+  plain: {bandwidth: 1 kHz, latency: 500 us, cost: 10}
+  led: {bandwidth: 1 kHz, latency: 500 us, lead: on, rate: 4 kHz, cost: 11}
+rpe_urad: {100 ms: "< 0.5"}
+residual_rms_urad: "< 0.5"
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("design") / "quick.yaml"
+    path.write_text(SHORT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(file):
+    asked = read_requirement(file)
+    return asked, search(asked)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("mirror", ["plain", "led"])
+def test_spectra_and_a_run_agree_within_five_percent(found, mirror):
+    asked, design = found
+    one = next(each for each in design.candidates if len(each.sensors) == 2 and each.mirror == mirror)
+    run = testbed.run(chosen_scenario(asked, one)).metrics.pointing[one.blend]
+    print(one.name, one.values, run.residual_rms_urad, run.rpe_urad)
+    assert_allclose(one.values["residual_rms_urad"], run.residual_rms_urad, rtol=0.05)
+    assert_allclose(one.values["rpe_urad.0.1"], run.rpe_urad["0.1"], rtol=0.05)
+
+
+@pytest.mark.oracle
+def test_a_filter_makes_of_a_sine_what_its_pulse_says(found):
+    """A Kalman filter of both sensors at 20 Hz, played: T to 1e-3."""
+    asked, _ = found
+    whole, f = asked.scenario, 20.0
+    spec = whole.fusion["kalman"]
+    response = filter_response(spec, whole.sensors, 20_000.0)
+    t = np.arange(60_000) / 20_000.0
+    rate = 1e-3 * np.sin(2.0 * np.pi * f * t)
+    readings = {
+        name: sensor.model_copy(update={"noise": False}).start(20_000.0, 0, name).process(rate)
+        for name, sensor in whole.sensors.items()
+    }
+    estimate = spec.start({name: sensor.sample_rate for name, sensor in whole.sensors.items()}).process(readings).rate
+    basis = np.exp(-2j * np.pi * f * t[40_000:])
+    T = np.mean(estimate[40_000:] * basis) / np.mean(rate[40_000:] * basis)
+    assert_allclose(1.0 + response.at(response.error, np.array([f]))[0], T, atol=1e-3)
+
+
+def test_the_cheapest_that_is_enough_is_chosen_and_the_front_falls(found):
+    asked, design = found
+    enough = [one for one in design.candidates if one.met]
+    assert design.chosen.cost == min(one.cost for one in enough)
+    assert all(bound.met(design.chosen.values[bound.metric]) for bound in asked.bounds)
+    front = design.pareto("rpe_urad.0.1")
+    costs, values = [one.cost for one in front], [one.values["rpe_urad.0.1"] for one in front]
+    assert costs == sorted(costs)
+    assert values == sorted(values, reverse=True)
+    for one in design.candidates:
+        assert any(
+            each.cost <= one.cost and each.values["rpe_urad.0.1"] <= one.values["rpe_urad.0.1"] for each in front
+        )
+
+
+def test_a_filter_that_adapts_has_no_spectrum_and_is_left_out(found):
+    _, design = found
+    assert {one.blend for one in design.candidates} == {"kalman"}
+    assert all("adapts" in reason for name, reason in design.refused.items() if "wideband" in name)
+    assert any("wideband" in name for name in design.refused)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        ("bandwidth: 10 Hz", "bandwidht: 10 Hz", "trackers.coarse.bandwidht", "did you mean"),
+        ("cost: 30", "cost: -1", "sensors.mhd_ars.cost", "at least 0"),
+        ('"< 0.5"}', '"0.5"}', "rpe_urad.100 ms", "expected a bound"),
+        ("100 ms:", "100 m:", "rpe_urad.100 m", "wrong dimension"),
+        ("duration: 6 s", "duraton: 6 s", "duraton", "did you mean"),
+        ("frequency: 30 Hz", "frequency: 30", "motion.0.sine.frequency", "unit is missing"),
+    ],
+)
+def test_what_is_wrong_is_found_at_its_place(tmp_path, old, new, key, words):
+    path = tmp_path / "bad.yaml"
+    path.write_text(SHORT.replace(old, new, 1))
+    with pytest.raises(testbed.ScenarioError) as caught:
+        read_requirement(path)
+    found = {problem.key: problem for problem in caught.value.problems}
+    assert words in found[key].message
+    assert found[key].line is not None
+
+
+def test_nothing_asked_is_an_error(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(SHORT.split("rpe_urad", maxsplit=1)[0])
+    with pytest.raises(testbed.ScenarioError, match="nothing is asked"):
+        read_requirement(path)
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_chosen_scenario_and_proves_it(file, tmp_path):
+    words = ["design", str(file), "--prove", "--seeds", "2", "--json", "--quiet", "--out", str(tmp_path / "out")]
+    spoken = CliRunner().invoke(app, words)
+    assert spoken.exit_code == 0, spoken.output
+    said = json.loads(spoken.stdout)
+    assert said["chosen"]["mirror"] == "led"
+    for row in said["proof"].values():
+        assert_allclose(row["mean"], row["by_spectra"], rtol=0.05)
+    again = testbed.load_scenario(tmp_path / "out" / "chosen.yaml")
+    assert again.pointing.mirror.lead
+    assert (tmp_path / "out" / "pareto.svg").exists()
+
+
+@pytest.mark.slow
+def test_the_example_chooses_what_its_page_says():
+    design = search(read_requirement(EXAMPLE))
+    print({one.name: (one.cost, one.values) for one in design.pareto("rpe_urad.0.1")})
+    assert design.chosen.sensors == ("mhd_ars",)
+    assert (design.chosen.mirror, design.chosen.cost) == ("led", 48.0)
+    assert_allclose(design.chosen.values["rpe_urad.0.1"], 0.155, atol=0.002)
