@@ -11,6 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from promises import Promise, conclude
+
 ROOT = Path(__file__).parents[1]
 PROGRAM = (
     "import resource, sys\nfrom testbed.cli import main\n"
@@ -42,7 +44,8 @@ def main(*arguments: str) -> None:
     for duration, peak in peaks.items():
         print(f"{mode}, {duration:6g} s: peak {peak:7.1f} MB")
     first, last = peaks[durations[0]], peaks[durations[-1]]
-    print(f"{durations[-1]:g} s / {durations[0]:g} s: {last / first:.3f}   (promised: at most 1.2)")
+    what = f"memory of a run of {durations[-1]:g} s over one of {durations[0]:g} s, mode {mode} [-]"
+    conclude(Promise(what, 1.2, last / first))
 
 
 if __name__ == "__main__":

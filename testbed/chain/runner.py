@@ -111,7 +111,8 @@ def _run_to_folder(
         sinks = open_sinks(stack, folder.path, scenario, chain, outputs)
         for part in blocks:
             if not part.start:
-                require_space(folder.path, disk_bytes(part, chain.rates, scenario.n_time, scenario.detail, outputs))
+                needed = disk_bytes(part, chain.rates, scenario.n_time, scenario.detail, outputs)
+                require_space(folder.path, needed, out)
             reach(part.start / chain.rates["base"])
             judge.write(part)
             for sink in sinks:

@@ -63,7 +63,7 @@ def disk_bytes(
     return round(stored + _SAMPLE * recorded) + _OTHER_FILES
 
 
-def require_space(place: Path, needed: int) -> None:
+def require_space(place: Path, needed: int, name: Path) -> None:
     """Refuse a run that its disk cannot hold.
 
     Parameters
@@ -72,6 +72,8 @@ def require_space(place: Path, needed: int) -> None:
         A folder on that disk.
     needed : int
         Size of the run [byte].
+    name : Path
+        Where it will appear, for the message.
 
     Raises
     ------
@@ -84,4 +86,4 @@ def require_space(place: Path, needed: int) -> None:
             f"the run takes about {needed / 1e9:.3g} GB, but its disk has room for {free / 1e9:.3g} GB: shorten the "
             "run, use fewer filters or choose another --out"
         )
-        raise ScenarioError([Problem(msg, file=str(place))])
+        raise ScenarioError([Problem(msg, file=str(name))])

@@ -109,8 +109,9 @@ def test_the_most_noise_fits_its_memory():
 def test_a_run_that_the_disk_cannot_hold_is_refused_and_leaves_nothing(tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _place: usage._replace(free=1_000_000))
-    with pytest.raises(ScenarioError, match=r"takes about 0\.01\d* GB, but its disk has room for 0\.001 GB"):
+    with pytest.raises(ScenarioError, match=r"takes about 0\.00\d+ GB, but its disk has room for 0\.001 GB") as caught:
         testbed.run(short(tmp_path), out=tmp_path / "run")
+    assert caught.value.problems[0].file == str(tmp_path / "run")
     assert [path.name for path in tmp_path.iterdir()] == ["short.yaml"]
 
 
