@@ -57,10 +57,19 @@ NOISE = {
     "mems_gyro": {
         "input_noise": ("0.15 deg/sqrt(h)", "data sheet ADIS16505-2, angle random walk: it passes the low-pass"),
         "output_noise": ("4.243e-5 deg/sqrt(h)", "assumed: 1e-9 (deg/s)^2 per reading at 2 kHz, keeps R positive"),
+        "bias_instability": ("2.7 deg/h", "data sheet ADIS16505-2, as in the preset"),
+        "rate_random_walk": ("0.1 deg/h/sqrt(h)", "assumed, as in the preset"),
+        "lowest_frequency": ("0.1 mHz", "assumed, as in the preset"),
+        "range": ("500 deg/s", "as in the preset"),
+        "resolution": ("0.3814697265625 udeg/s", "one count of the 32-bit word"),
     },
     "mhd_ars": {
         "input_noise": ("0 deg/sqrt(h)", ""),
-        "output_noise": ("100 nrad/s/sqrt(Hz)", "as in the preset, its 1/f part left out; the 18-bit step adds 0.7 %"),
+        "output_noise": ("100 nrad/s/sqrt(Hz)", "as in the preset; the 18-bit step adds 0.7 %"),
+        "noise_knee": ("0.1 Hz", "assumed, as in the preset"),
+        "lowest_frequency": ("0.1 mHz", "assumed, as in the preset"),
+        "range": ("30 deg/s", "as in the preset"),
+        "resolution": ("2.288818359375e-4 deg/s", "18 bits over +-30 deg/s"),
     },
 }
 

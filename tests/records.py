@@ -5,10 +5,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping
+from typing import Literal
 
 import numpy as np
 
 from testbed.fusion import estimate
+from testbed.fusion.analysis.optimum import filters_from, period_map
+from testbed.fusion.belief import load_belief
+from testbed.fusion.model import build_model
 from testbed.sensors import load_preset
 from testbed.signals import FloatArray
 
@@ -76,6 +80,25 @@ def judged(
     block = estimate(name, readings, sample_rate_hz=RATES, **parameters)
     part = slice(round(begin * FS), round(end * FS))
     return rms((block.rate - rate)[part]) / DEG, rms(block.std[part]) / DEG
+
+
+def left_by(order: int, q: float, start: Literal["unknown", "rest"]) -> float:
+    """Return the rms standard deviation 10 to 14 s after a start that the Kalman filter of that signal model has with
+    white noise and exact sensors [rad/s]: the Riccati recursion by maps of a second, nothing simulated.
+    """
+    model = build_model(load_belief("identified"), RATES, order=order, q=q, start=start)
+    period = period_map(model, model.Q[None])
+    second, periods = None, round(model.sample_rate_hz / model.cycle)
+    while periods:
+        if periods & 1:
+            second = period if second is None else second.then(period)
+        period, periods = period.then(period), periods >> 1
+    P, found = model.P0[None], []
+    for k in range(14):
+        P = second.applied(P)
+        if k + 1 >= 10:
+            found.append(filters_from(model, np.array([q]), model.Q[None], P).posterior()[:, 0, 0, 0].mean())
+    return math.sqrt(np.mean(found))
 
 
 def rms(values: FloatArray) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from testbed.cli.console import ruled, terminal
 from testbed.cli.sights import aim_words
 from testbed.cli.understood import doubts, print_facts, print_sheets
+from testbed.fusion.coloured import slow_noise
 from testbed.scenario.departures import departures
 from testbed.scenario.peaks import played
 
@@ -89,7 +90,28 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
     print_facts(console, facts)
     if scenario.pointing is not None:
         console.print(f"pointing: {aim_words(scenario)}", soft_wrap=True, highlight=False)
+    for line in slow_noise_lines(scenario):
+        console.print(line, soft_wrap=True)
     console.print("The scenario is valid; --all shows every key.")
+
+
+def slow_noise_lines(scenario: Scenario) -> list[str]:
+    """Return, per sensor and fit, how many states carry its slow noise, how well, and in which filters.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    users: dict[str, list[str]] = {}
+    for name, spec in scenario.fusion.items():
+        carried = spec.belief if getattr(spec.parameters, "coloured", False) else {}
+        for sensor, belief in carried.items():
+            noise = slow_noise(belief)
+            if noise.size:
+                words = f"slow noise of {sensor}: {noise.size} states, within {noise.error_db:.2g} dB of its density"
+                users.setdefault(words, []).append(name)
+    return [f"{words} ({', '.join(names)})" for words, names in users.items()]
 
 
 def _print_departures(scenario: Scenario) -> None:

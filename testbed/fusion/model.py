@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 # Derivatives of the rate are kept per 10 ms, so that they are of the rate's own size in the band of interest.
-_TIME_UNIT = 1e-2
+TIME_UNIT = 1e-2
 # The derivatives of the rate at the start: of 1 deg/s at 100 Hz.
 _START_STD = math.radians(1.0)
 _START_FREQ_HZ = 100.0
@@ -205,7 +205,7 @@ def _start(
     still = np.zeros(len(A))
     still[0], still[rest] = 1.0, constant_response(sensors, drive)
     for k in range(1, order):
-        P0[k, k] = (_START_STD * (2.0 * np.pi * _START_FREQ_HZ * _TIME_UNIT) ** k) ** 2
+        P0[k, k] = (_START_STD * (2.0 * np.pi * _START_FREQ_HZ * TIME_UNIT) ** k) ** 2
     if start == "rest":
         P0 += REST_STD**2 * np.outer(still, still)
     else:
@@ -239,10 +239,10 @@ def continuous_model(
         If a sensor with feed-through has input noise: it would be output noise too, correlated with the process.
     """
     realisations = [one.realisation() for one in believed]
-    chain = np.diag(np.full(order - 1, 1.0 / _TIME_UNIT), 1)
+    chain = np.diag(np.full(order - 1, 1.0 / TIME_UNIT), 1)
     A = block_diag(chain, *(one.A for one in realisations))
     Qc = np.zeros_like(A)
-    Qc[order - 1, order - 1] = q * _TIME_UNIT ** (2 * (order - 1))
+    Qc[order - 1, order - 1] = q * TIME_UNIT ** (2 * (order - 1))
     H = np.zeros((len(believed), A.shape[0]))
     at = order
     for i, (sensor, one) in enumerate(zip(believed, realisations, strict=True)):

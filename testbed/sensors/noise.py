@@ -209,10 +209,10 @@ class GyroTerms(Part):
         Returns
         -------
         dict of str to NoiseTerm
-            In the order of addition, each on the stream ``(*names, term, "sampled")``.
+            In the order of addition, each on the stream ``(*names, term)``.
         """
         return {
-            term: SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, *names, term, "sampled"))
+            term: SampledNoise(sampled(shape, passed, sample_rate_hz), random_stream(seed, *names, term))
             for term, shape in self.shapes().items()
         }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from testbed.chain.forecast import forecast
 from testbed.cli.check_page import print_page, size_words, warnings
 from testbed.judging.table_facts import table_facts
@@ -21,6 +23,9 @@ def test_the_page_says_what_departs_and_fits_a_screen_or_two(tmp_path, capsys):
     assert "motion 1: sine frequency 10 Hz, rate 1 deg/s" in out
     assert size_words(size) in out
     assert "gravity" not in out
+    # Six of one sensor and five of the other: one a decade (docs/starts_and_gaps.md).
+    assert re.search(r"slow noise of mhd_ars: 6 states, within 0.2\d? dB of its density \(kalman\)", out)
+    assert re.search(r"slow noise of mems_gyro: 5 states, within 0.2\d? dB of its density \(kalman\)", out)
 
 
 def test_a_motion_that_is_seen_in_windows_is_told(tmp_path):

@@ -59,29 +59,32 @@ def test_it_is_built_or_says_what_it_expects(name, case_name):
     assert not message or message.startswith("belief: expected")
 
 
-def test_hardly_anything_is_refused():
-    """Who refuses everything would pass above: all but an inverse of an optical gyro's mean over its interval works."""
-    optical = [name for name, kind in PRESETS.items() if kind == "fog"]
-    refused = {(name, case_name.split()[-1]) for name in NAMES for case_name in CASES if refusal(name, case_name)}
-    assert refused <= {(name, gyro) for name in ("complementary", "blending") for gyro in optical}
+def test_nothing_is_refused():
+    """Who refuses everything would pass above."""
+    assert not [(name, case_name) for name in NAMES for case_name in CASES if refusal(name, case_name)]
 
 
-# Gyros whose slow noise, since their beliefs have it, a pair of paths does not count in full.
-CLAIM_TOO_LITTLE = {"dsp3000", "hg1700", "stim300"}
+# The inverse of a mean over 5 ms keeps the beginning of a sine for 3 s, above what the settled filter errs and claims.
+BEGINS_LONG = pytest.mark.xfail(strict=True, reason="in the first second it errs by 1.6 of its claim")
+PAIRS = [
+    pytest.param(
+        name,
+        one,
+        marks=BEGINS_LONG if name in ("complementary", "blending") and one == "exactly sx300 and hg9900" else (),
+    )
+    for name in NAMES
+    if METHODS[name].needs_both
+    for one in CASES
+]
 
 
-@pytest.mark.parametrize("case_name", CASES)
-@pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].needs_both])
+@pytest.mark.parametrize(("name", "case_name"), PAIRS)
 def test_a_fixed_pair_of_paths_follows_a_sine_with_any_of_them(name, case_name):
     """What it is designed from differs most from belief to belief: 1 deg/s at 10 Hz is met as claimed, or to a
     thousandth where the claim is less.
     """
     belief, rates = case(case_name)
     rate = sines((10.0, 1.0), duration=1.5)
-    if refusal(name, case_name):
-        pytest.skip("refused")
-    if case_name.split()[-1] in CLAIM_TOO_LITTLE:
-        pytest.xfail("of a gyro this quiet a pair of paths claims up to a fifth less than it errs")
     stage = METHODS[name](belief, rates, METHODS[name].Parameters(**from_rest(name)))
     block = stage.process(readings_of(rate, 1, belief, rates))
     error, claimed = (np.sqrt(np.mean(x[10_000:] ** 2)) for x in (block.rate - rate, block.std))

@@ -81,8 +81,10 @@ class FixedFilters:
             total, power = W[0], M[0]
             for p in range(1, steps):
                 total, power = W[p] + M[p] @ total @ _t(M[p]), M[p] @ power
-            for _ in range(_DOUBLINGS):
-                total, power = total + power @ total @ _t(power), power @ power
+            # The error of a filter that does not settle overflows.
+            with np.errstate(over="ignore", invalid="ignore"):
+                for _ in range(_DOUBLINGS):
+                    total, power = total + power @ total @ _t(power), power @ power
             variance = np.zeros(self.q.size)
             for p in range(steps):
                 total = W[p] + M[p] @ total @ _t(M[p])
@@ -361,7 +363,8 @@ def optima(
 def _least(filters: FixedFilters, order: int, shares: FloatArray, lag: FloatArray) -> Optimum:
     """Return the best of the filters, given the noise variance by sensor and the lag power of each [rad^2/s^2]."""
     noise = shares.sum(axis=0)
-    i = int(np.argmin(noise + lag))
+    both = noise + lag
+    i = int(np.argmin(np.where(np.isfinite(both), both, np.inf)))
     return Optimum(
         rmse=float(np.sqrt(noise[i] + lag[i])),
         noise=float(np.sqrt(noise[i])),

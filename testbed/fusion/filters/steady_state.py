@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from testbed.fusion.analysis.optimum import optimum
+from testbed.fusion.analysis.even import EvenDesign, most_even
+from testbed.fusion.analysis.optimum import Optimum, optimum
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
-from testbed.fusion.kernels.covariance import COUNTS, EVERY, settling_kernel
-from testbed.fusion.model import build_model
+from testbed.fusion.kernels.covariance import COUNTS, EVERY, PRESENT, settling_kernel
+from testbed.fusion.model import TIME_UNIT, build_model
 from testbed.fusion.model_filter import initial_state
 from testbed.units import DEG, Frequency, Range
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
     from testbed.parts import Part
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 # Seconds between two looks at the gains.
 _CHECK_EVERY = 1.0
+# Standard deviation that the rate is granted to depart from its last value while no sensor is read, over the amplitude:
+# a sine departs by 1, but for a whole period and not from step to step anew, as the recursion takes it.
+_DEPARTURE = 3.0
 
 
 class SteadyStateParameters(CommonParameters):
@@ -30,22 +34,22 @@ class SteadyStateParameters(CommonParameters):
 
     Parameters
     ----------
-    frequency : float
-        Of a sine [Hz].
+    frequency : float, optional
+        Of a sine [Hz]; left out: no frequency from 0.1 to 500 Hz is to cost much more than its optimum.
     amplitude : float
-        Of that sine [rad/s].
+        Of the sine [rad/s].
     coloured : bool
         Give the belief's slow noise (1/f, turn-on bias, rate random walk) states of its own.
     """
 
-    frequency: Frequency = 10.0
+    frequency: Frequency | None = None
     amplitude: Range = math.radians(1.0)
     coloured: Switch = True
 
 
 class SteadyState(BlockFilter):
     r"""Kalman filter that stops computing its covariance once it has settled, order and q those of the `optimum` of a
-    sine.
+    sine, or the ones that no sine makes much worse than its own.
 
     .. math:: x^- = F x, \quad x = x^- + K_p (z - H x^-)
 
@@ -53,7 +57,8 @@ class SteadyState(BlockFilter):
     belief's noise and from the sine named. From the start, and from the settled covariance on after every missing
     reading, K_p is that of the recursion, until no gain changes by more than 1e-3 of itself within a second; gains made
     for two sensors, applied while one is silent, would be unstable. With states of 1/f noise they never settle within
-    an hour.
+    an hour. While a sensor is missing q is that of the same design for those that are left; while all are, the rate is
+    believed to depart by no more than three amplitudes from its last value.
 
     Parameters
     ----------
@@ -79,15 +84,20 @@ class SteadyState(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        best = optimum(belief, sample_rate_hz, [(parameters.frequency, parameters.amplitude)])
-        self.model = build_model(
-            belief,
-            sample_rate_hz,
-            order=best.order,
-            q=best.q,
-            coloured=parameters.coloured,
-            start=parameters.start,
+        best = _design(belief, sample_rate_hz, parameters)
+        q, self._granted = _of_those_left(belief, sample_rate_hz, parameters, best)
+        *others, self.model = (
+            build_model(
+                belief,
+                sample_rate_hz,
+                order=best.order,
+                q=one,
+                coloured=parameters.coloured,
+                start=parameters.start,
+            )
+            for one in q
         )
+        self._Q = np.array([one.Q for one in (*others, self.model)])
         n, n_sensor = len(self.model.F), len(self.model.H)
         n_step = math.lcm(*self.model.strides)
         self._x, self._P = initial_state(self.model, parameters), self.model.P0.copy()
@@ -99,8 +109,53 @@ class SteadyState(BlockFilter):
         )
         self._progress = np.zeros(COUNTS + n_sensor, dtype=np.int64)
         self._progress[EVERY] = round(_CHECK_EVERY * self.model.sample_rate_hz)
+        self._progress[PRESENT] = len(self._Q) - 1
+        self._last = np.array([self._x[0], self._P[0, 0], (_DEPARTURE * parameters.amplitude) ** 2])
         self._run = settling_kernel(n, n_sensor, self.model.n_slow)
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
-        model = self.model
-        self._run(self._x, self._P, model.F, model.Q, model.H, model.R, Z, self._cycle, self._progress, out)
+        model, memory = self.model, (self._cycle, self._progress, self._last, self._granted)
+        self._run(self._x, self._P, model.F, self._Q, model.H, model.R, Z, *memory, out)
+
+
+def _design(
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    parameters: SteadyStateParameters,
+    orders: Sequence[int] = (1, 2, 3),
+) -> Optimum | EvenDesign:
+    """Return the order and the signal noise for the sensors that have a rate."""
+    if parameters.frequency is None:
+        return most_even(belief, sample_rate_hz, parameters.amplitude, orders=orders)
+    return optimum(belief, sample_rate_hz, [(parameters.frequency, parameters.amplitude)], orders=orders)
+
+
+def _of_those_left(
+    belief: Mapping[str, SensorBelief],
+    sample_rate_hz: Mapping[str, float],
+    parameters: SteadyStateParameters,
+    best: Optimum | EvenDesign,
+) -> tuple[list[float], FloatArray]:
+    r"""Return for every set of sensors, bit i of its number for sensor i, the signal noise and what it grants to the
+    derivatives of the rate, shape (2^n_sensor, order).
+
+    Where none of a set sees a constant rate no filter settles: signal noise of the whole, nothing taken off. Else a
+    sine of amplitude A is believed to be no faster than the filter, which ends at :math:`(q / S)^{1 / 2m}`.
+    """
+    sensors, q = list(sample_rate_hz), []
+    granted = np.full((2 ** len(sensors), best.order), np.inf)
+    for number in range(len(granted) - 1):
+        left = {name: sample_rate_hz[name] for i, name in enumerate(sensors) if number >> i & 1}
+        if not any(belief[name].sees_constant for name in left):
+            q.append(best.q)
+            continue
+        q.append(_design(belief, left, parameters, (best.order,)).q)
+        density = 1.0 / sum(1.0 / _white(belief[name]) for name in left)
+        end = TIME_UNIT * (q[-1] / density) ** (0.5 / best.order)
+        granted[number, 1:] = (parameters.amplitude * end ** np.arange(1, best.order)) ** 2
+    return [*q, best.q], granted
+
+
+def _white(belief: SensorBelief) -> float:
+    """Return the input-referred white noise of a sensor at the middle of its band [rad^2/s]."""
+    return belief.input_noise**2 + (belief.output_noise / belief.largest_gain()) ** 2

@@ -35,9 +35,11 @@ INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
 # row: what lasts longer is the signal. So wide that the lag behind a fast signal stays inside, and a spike inside does
 # no harm that lasts.
 GATE, PATIENCE = 1000.0, 10
+# Variance of a rate that is lost, as in a gap of all sensors [rad^2/s^2]: no signal is believed to go beyond it.
+LOST_VARIANCE = 1.0
 # Entries of `progress` of `settling_kernel`, its modes, and the relative change of a gain between two checks that ends
 # the recursion.
-STARTED, STEP, MODE, SINCE, KEPT, EVERY, COUNTS = range(7)
+STARTED, STEP, MODE, SINCE, KEPT, EVERY, PRESENT, COUNTS = range(8)
 RECURSION, KEEPING, SETTLED = range(3)
 SETTLED_CHANGE = 1e-3
 # Rows of the output of `adaptive_kernel`; then ADAPTIVE_ROWS per sensor, the first two as above.
@@ -145,6 +147,24 @@ def grow(P, F, Q, reach, work, n, core):  # noqa: PLR0912  # pragma: no cover
             total = Q[i, j] + F[i, i] * P[i, j] * F[j, j]
             P[i, j] = total
             P[j, i] = total
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def recall(x, P, i, most, toward, g, n):  # pragma: no cover
+    """Take off the variance of state i beyond `most`, by a reading of it `toward` that is just so uncertain: a
+    covariance that grew without end would lose its sign at the next reading.
+    """
+    spread = P[i, i]
+    if not spread > most:
+        return
+    share, off = (spread - most) / spread, x[i] - toward
+    for j in range(n):
+        g[j] = P[j, i] / spread
+    for j in range(n):
+        x[j] -= share * g[j] * off
+        for k in range(j + 1):
+            P[j, k] -= share * spread * g[j] * g[k]
+            P[k, j] = P[j, k]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -413,6 +433,26 @@ def row_square(D, j, n):  # pragma: no cover
     return total
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def recall_root(x, D, G, K, R, due, n):  # pragma: no cover
+    """Do what `recall` does, to the root D, beyond LOST_VARIANCE and toward 0; G, K, R and due are room for one
+    reading.
+    """
+    spread, most, rate = row_square(D, 0, n), D.dtype.type(LOST_VARIANCE), x[0]
+    if not spread > most:
+        return
+    R[0], due[0] = spread * most / (spread - most), True
+    for k in range(n):
+        G[0, k] = D[0, k]
+    for j in range(n):
+        total = x.dtype.type(0.0)
+        for k in range(n):
+            total += D[j, k] * G[0, k]
+        K[j, 0] = total / (spread + R[0])
+        x[j] -= K[j, 0] * rate
+    update_root(D, G, K, R, due, n, 1)
+
+
 @functools.lru_cache
 def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
     """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
@@ -433,6 +473,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         H = np.empty((n_sensor, n), kind)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
+        lost = np.empty(1, kind)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
         spans(F, core, n, reach)
@@ -442,8 +483,10 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
             if started:
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
+                    recall_root(x, P, G, gain, lost, due, n)
                 elif form == JOSEPH:
                     predict(x, P, F, Q, reach, work, moved, n, core)
+                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False
@@ -503,24 +546,28 @@ def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
 
 @functools.lru_cache
 def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, Q, H, R, Z, cycle, progress, out), the Kalman filter until its gains have settled, then with
-    those.
+    """Return run(x, P, F, Q, H, R, Z, cycle, progress, last, granted, out), the Kalman filter until its gains have
+    settled, then with those.
 
     `cycle` = (K, C, settled, before): gains (n_step, n, n_sensor), variance of an innovation (n_step, n_sensor) and
     covariance after the readings (n_step, n, n) of each step of the cycle in which the readings repeat, and the gains
     (n, n_sensor) that the next check compares with. `progress` = [started, step, mode, steps since the last check,
-    steps of the cycle kept, steps between checks], then one count per sensor as in `outside_gate`. A reading that is
-    due and missing ends the settled state: the recursion goes on from its covariance. `out` as in `kalman_kernel`.
+    steps of the cycle kept, steps between checks, which sensors are there], then one count per sensor as in
+    `outside_gate`. A reading that is due and missing ends the settled state: the recursion goes on from its covariance
+    with the Q of the sensors that are there, Q (2^n_sensor, n, n), bit i for sensor i. `last` = [rate, its variance,
+    variance of its departure], of the last reading: with no sensor at all the rate is not believed to go further.
+    `granted` (2^n_sensor, order) is the variance of the rate's derivatives that is believed of a signal which those
+    sensors could follow. `out` as in `kalman_kernel`.
     """
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, cycle, progress, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q, H_in, R, Z, cycle, progress, last, granted, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
-        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        P, F, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
         K, C_settled, settled, before = cycle
-        x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
+        x[:], P[:], F[:], H[:] = x_in, P_in, F_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
         spans(F, core, n, reach)
         spans(H, 0, core, seen[:, :2])
@@ -543,10 +590,16 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             read = progress[MODE] == SETTLED
             if progress[MODE] != SETTLED:
                 if progress[STARTED] > 0:
-                    grow(P, F, Q, reach, work, n, core)
+                    grow(P, F, Q[progress[PRESENT]], reach, work, n, core)
+                    recall(x, P, 0, last[1] + last[2], last[0], g, n)
                 for i in range(n_sensor):
                     e[i] = np.nan
+                    if np.isinf(Z[i, k]) and progress[PRESENT] >> i & 1:
+                        progress[PRESENT] &= ~(1 << i)
+                        for j in range(1, granted.shape[1]):
+                            recall(x, P, j, granted[progress[PRESENT], j], 0.0, g, n)
                     if np.isfinite(Z[i, k]):
+                        progress[PRESENT] |= 1 << i
                         e[i], spread = innovation(x, P, H, seen, i, Z[i, k], g, n, core)
                         C[i] = spread + R[i]
                         progress[COUNTS + i] = outside_gate(progress[COUNTS + i], e[i], C[i])
@@ -577,7 +630,10 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             if read:
                 progress[STARTED] = 1
             out[RATE, k] = x[0]
-            out[STD, k] = np.sqrt(settled[step, 0, 0] if progress[MODE] == SETTLED else P[0, 0])
+            variance = settled[step, 0, 0] if progress[MODE] == SETTLED else P[0, 0]
+            out[STD, k] = np.sqrt(variance)
+            if read:
+                last[0], last[1] = x[0], variance
             if progress[MODE] == RECURSION and progress[STARTED] > 0:
                 progress[SINCE] += 1
                 if step == 0 and progress[SINCE] > progress[EVERY]:
@@ -745,7 +801,7 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
         square = np.empty(n_sensor)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
-        array = np.empty((n, 2 * n), kind)
+        array, lost = np.empty((n, 2 * n), kind), np.empty(1, kind)
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
         spans(F, core, n, reach)
@@ -757,8 +813,10 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
             if predicted:
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
+                    recall_root(x, P, G, gain, lost, due, n)
                 elif form == JOSEPH:
                     predict(x, P, F, Q, reach, work, moved, n, core)
+                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
                 else:
                     predict_plain(x, P, F, Q, work, moved, n)
             read = False

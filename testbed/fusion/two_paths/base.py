@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -16,6 +17,7 @@ from testbed.fusion.two_paths.design import (
     BAND_ORDER,
     HIGH_HZ,
     LOW_HZ,
+    at,
     band_end,
     best_crossover,
     input_psd,
@@ -25,7 +27,7 @@ from testbed.fusion.two_paths.design import (
     without_far_zeros,
     zeros_at_dc,
 )
-from testbed.fusion.two_paths.kernel import LEAN, MEMORY_ENTRIES, VARIANCE, two_paths
+from testbed.fusion.two_paths.kernel import MEMORY_ENTRIES, VARIANCE, two_paths
 from testbed.fusion.two_paths.noise import alone_variance, noise_variance, slow_variance
 from testbed.units import Frequency, Range
 
@@ -37,8 +39,9 @@ if TYPE_CHECKING:
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
-# Modes of the slow path slower than this [rad/s] keep what they got wrong at the start, of a sine of this frequency.
-_SLOW_MODES, _ALTERNATING_HZ = 3.0, 0.5
+# Modes of the slow path slower than this [rad/s] keep what they got wrong at the start, of a sine of this frequency;
+# its mean is taken over so many seconds.
+_SLOW_MODES, _ALTERNATING_HZ, _MEAN_OVER = 3.0, 0.5, 5.0
 
 
 class TwoPathParameters(CommonParameters):
@@ -106,19 +109,28 @@ class TwoPaths(BlockFilter):
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
-        clock = 2.0 * math.pi * self.model.sample_rate_hz
-        slow, fast = (without_far_zeros(belief[self.model.sensors[i]], clock) for i in (self._slow, self._fast))
+        slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
+        slow_rate_hz = self.model.sample_rate_hz / self.model.strides[self._slow]
+        # The mean over an interval, as optical gyros read, has its first zero at the rate of the readings.
+        come = _as_they_come(slow, parameters.frequency, slow_rate_hz)
+        slow = without_far_zeros(slow, math.pi * slow_rate_hz)
+        come /= complex(slow.realisation().response(np.array([parameters.frequency]))[0])
+        fast = without_far_zeros(fast, 2.0 * math.pi * self.model.sample_rate_hz)
         order = self.order
         if zeros_at_dc(fast) > 1:
             msg = f"belief: expected at most one zero at s = 0 for the fast sensor, got {zeros_at_dc(fast)}"
             raise ValueError(msg)
-        self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order) / (2.0 * math.pi)
-        crossover = 2.0 * math.pi * self.crossover_hz
         power = parameters.amplitude**2 / 2.0
+        alone_band, alone = _best_alone(slow, slow_rate_hz, parameters.frequency, power, come)
+        late = 1.0 - at(alone_band, parameters.frequency) * come
+        lagging = parameters.frequency, power * abs(late) ** 2
+        self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order, *lagging) / (2.0 * math.pi)
+        crossover = 2.0 * math.pi * self.crossover_hz
+        share = at(low_pass(order, crossover), parameters.frequency)
 
         def candidate(bandwidth_hz: float) -> FloatArray:
             band = band_end(slow, fast, 2.0 * math.pi * bandwidth_hz)
-            lag = power * abs(_band_error(band, parameters.frequency)) ** 2
+            lag = power * abs((1.0 - share) * (1.0 - at(band, parameters.frequency)) + share * late) ** 2
             paths = parallel(slow, fast, order, crossover, band)
             return lag + noise_variance(paths, self.model, self._slow, self._fast)
 
@@ -126,15 +138,14 @@ class TwoPaths(BlockFilter):
         self._settled = candidate(self.bandwidth_hz)
         band = band_end(slow, fast, 2.0 * math.pi * self.bandwidth_hz)
         T = 1.0 / self.model.sample_rate_hz
-        slow_rate_hz = self.model.sample_rate_hz / self.model.strides[self._slow]
-        alone_band, alone = _best_alone(slow, slow_rate_hz, parameters.frequency, power)
-        self._paths = tuple(_stepped(inverted(*one), T) for one in ((fast, band), (slow, alone_band)))
+        beginning = _beginning(slow, inverted(slow, alone_band))
+        of_fast, of_slow = (_stepped(inverted(*one), T) for one in ((fast, band), (slow, alone_band)))
+        self._paths = of_fast, (*of_slow, beginning.modes)
         self._x = tuple(np.zeros(path[0].shape[0]) for path in self._paths)
         rest = parameters.start == "rest"
         spread = unknown_spread([belief[name] for name in self.model.sensors])
         unknown = spread.constant**2 + spread.alternating**2
         density = float(input_psd(slow)(np.array([self.crossover_hz]))[0])
-        lean, slowest = _lean(slow, self._paths[1], inverted(slow, alone_band))
         self._setting = np.array(
             [
                 T,
@@ -147,16 +158,21 @@ class TwoPaths(BlockFilter):
                 power,
                 2.0 * self.model.strides[self._slow],
                 parameters.rest_rate if rest else math.nan,
-                math.exp(-slowest * T),
+                math.exp(-beginning.slowest * T),
                 _drift(fast, 1e-3 * self.crossover_hz),
                 parameters.rest_rate * fast.numerator[-1] / fast.denominator[-1] if rest else 0.0,
                 math.sqrt(_drift(fast, 1e-3 * self.crossover_hz)) / fast.output_noise,
                 slow_variance(slow, fast, order, crossover),
+                parameters.rest_rate * slow.numerator[-1] / slow.denominator[-1] if rest else 0.0,
+                beginning.share * spread.alternating,
+                spread.alternating**2,
+                math.exp(-2.0 * beginning.fastest * T),
+                _MEAN_OVER * slow_rate_hz,
+                slow_rate_hz / (math.sqrt(2.0) * math.pi * _ALTERNATING_HZ),
             ]
         )
         self._memory = np.zeros(MEMORY_ENTRIES)
         self._memory[VARIANCE] = REST_STD**2 if rest else unknown
-        self._memory[LEAN] = 0.0 if rest else lean * spread.alternating
 
     def _advance(self, Z: FloatArray, out: FloatArray) -> None:
         two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
@@ -195,10 +211,11 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     return slow, fast
 
 
-def _band_error(band: tuple[FloatArray, FloatArray], freq_hz: float) -> complex:
-    """Return 1 - B at a frequency [-]."""
-    s = 2j * math.pi * freq_hz
-    return complex(1.0 - np.polyval(band[0], s) / np.polyval(band[1], s))
+def _as_they_come(slow: SensorBelief, freq_hz: float, sample_rate_hz: float) -> complex:
+    """Return readings over a sine, held for their interval: half of it late [-]."""
+    return complex(slow.realisation().response(np.array([freq_hz]))[0]) * cmath.exp(
+        -1j * math.pi * freq_hz / sample_rate_hz
+    )
 
 
 def _drift(fast: SensorBelief, freq_hz: float) -> float:
@@ -207,23 +224,43 @@ def _drift(fast: SensorBelief, freq_hz: float) -> float:
     return float((2.0 * math.pi * freq_hz * fast.output_noise / response) ** 2)
 
 
-def _lean(slow: SensorBelief, path: tuple[Any, ...], inverse: Realisation) -> tuple[float, float]:
-    """Return how much of a rate that alternates at the start ends in the slow modes of the slow path [-], which stand
-    in equilibrium with its first reading, and how fast that decays [1/s].
+class _Beginning(NamedTuple):
+    """What the slow path does that begins in equilibrium with its first reading of a rate that alternates.
+
+    Parameters
+    ----------
+    modes : ndarray, shape (n_state,)
+        Its slow modes in equilibrium with a unit reading [-], zero for the others.
+    share : float
+        What they make of the rate [-].
+    slowest, fastest : float
+        How fast the slowest of them decays, and the slowest of the others [1/s].
     """
+
+    modes: FloatArray
+    share: float
+    slowest: float
+    fastest: float
+
+
+def _beginning(slow: SensorBelief, inverse: Realisation) -> _Beginning:
+    """Return what the inverse of the slow sensor does at its beginning."""
     rate = -np.diag(inverse.A)
-    modes = (rate > 0.0) & (rate < _SLOW_MODES)
+    lasting = (rate > 0.0) & (rate < _SLOW_MODES)
+    modes = np.where(lasting, constant_response(inverse.A, inverse.B), 0.0)
     reading = abs(slow.realisation().response(np.array([_ALTERNATING_HZ]))[0])
-    share = float(np.abs(path[3] * path[5])[modes].sum() * reading)
-    return share, float(rate[modes].min()) if modes.any() else 1.0
+    share = float(np.abs(inverse.C * modes).sum() * reading)
+    slowest = float(rate[lasting].min()) if lasting.any() else 1.0
+    return _Beginning(modes, share, slowest, float(rate[~lasting].min()))
 
 
 def _best_alone(
-    slow: SensorBelief, sample_rate_hz: float, freq_hz: float, power: float
+    slow: SensorBelief, sample_rate_hz: float, freq_hz: float, power: float, come: complex
 ) -> tuple[tuple[FloatArray, FloatArray], float]:
     """Return the band end with which the slow sensor alone errs least for a sine, and that error [rad^2/s^2].
 
-    Its poles are two more than the inverse needs, so that the steps of readings that are held do not come through.
+    `come` is how its readings come at the sine, over the model that is inverted [-]. Its poles are two more than the
+    inverse needs, so that the steps of readings that are held do not come through.
     """
 
     def band_of(bandwidth_hz: float) -> tuple[FloatArray, FloatArray]:
@@ -232,7 +269,7 @@ def _best_alone(
 
     def error(log_f: float) -> float:
         band = band_of(math.exp(log_f))
-        lag = power * abs(_band_error(band, freq_hz)) ** 2
+        lag = power * abs(1.0 - at(band, freq_hz) * come) ** 2
         return math.log(lag + alone_variance(slow, band, sample_rate_hz))
 
     bounds = math.log(1.0), math.log(sample_rate_hz / 8.0)

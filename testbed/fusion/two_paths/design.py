@@ -94,6 +94,20 @@ def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray
     return a[-order:], a
 
 
+def at(fraction: tuple[FloatArray, FloatArray], freq_hz: float) -> complex:
+    """Return numerator over denominator in s at a frequency [-].
+
+    Parameters
+    ----------
+    fraction : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator, highest power first.
+    freq_hz : float
+        [Hz].
+    """
+    s = 2j * math.pi * freq_hz
+    return complex(np.polyval(fraction[0], s) / np.polyval(fraction[1], s))
+
+
 def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
     """Return the two-sided input-referred noise density of a belief, Hz -> rad^2/s.
 
@@ -113,10 +127,10 @@ def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
     return psd
 
 
-def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int) -> float:
-    r"""Return the corner w [rad/s] of L that leaves the least noise.
+def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int, freq_hz: float = 1.0, lag: float = 0.0) -> float:
+    r"""Return the corner w [rad/s] of L that leaves the least noise and lag.
 
-    .. math:: \min_w \int |L|^2 S_{slow} + |1 - L|^2 S_{fast}\, df
+    .. math:: \min_w 2 \int |L|^2 S_{slow} + |1 - L|^2 S_{fast}\, df + |L(f_0)|^2 \sigma^2
 
     by trapezoid in ln f from 1e-5 Hz to 1 kHz, 100 points per decade. For white noise N of the slow sensor and n (1 +
     (w_c / w)^2)^(1/2) of the fast one it is w_c n / N for order 1 and w_c n / N / sqrt(3) for order 2.
@@ -127,6 +141,8 @@ def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int) -> float:
         The sensor that is better at low frequency, and the other.
     order : int
         Order of L.
+    freq_hz, lag : float, optional
+        A sine [Hz], and how the slow path by itself errs there, in mean square [rad^2/s^2].
     """
     freq = np.logspace(math.log10(LOW_HZ), math.log10(HIGH_HZ), 801)
     s = 2j * np.pi * freq
@@ -135,7 +151,8 @@ def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int) -> float:
     def noise(log_w: float) -> float:
         b, a = low_pass(order, math.exp(log_w))
         L = np.polyval(b, s) / np.polyval(a, s)
-        return math.log(np.trapezoid((np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast) * freq, np.log(freq)))
+        density = np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast
+        return math.log(2.0 * np.trapezoid(density * freq, np.log(freq)) + lag * abs(at((b, a), freq_hz)) ** 2)
 
     bounds = math.log(2.0 * math.pi * LOW_HZ), math.log(2.0 * math.pi * HIGH_HZ)
     return math.exp(minimize_scalar(noise, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
@@ -206,7 +223,7 @@ def without_far_zeros(sensor: SensorBelief, reach: float) -> SensorBelief:
     far = np.abs(zeros) > reach
     if not far.any():
         return sensor
-    near = b[0] * np.prod(-zeros[far]) * np.poly(zeros[~far])
+    near = np.atleast_1d(b[0] * np.prod(-zeros[far]) * np.poly(zeros[~far]))
     return sensor.model_copy(update={"numerator": tuple(np.real(near).tolist())})
 
 

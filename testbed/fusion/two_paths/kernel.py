@@ -10,8 +10,9 @@ from testbed.fusion.kernels.covariance import RATE, STD
 SLOW_INNOVATION = 2
 # Entries of `memory`, what stays between blocks: whether either sensor has begun, its last reading, what the slow path
 # has added to the fast one and the slope of that, the variance of the sum, time without the fast sensor [s], steps
-# since the slow one, the step of the cycle; what an alternating rate at the start has put into the slow modes of the
-# slow path, and what of it is in the sum [rad/s].
+# since the slow one, the step of the cycle. Of the slow path's beginning: the mean of its readings since [rad/s] and
+# their number, what is left in its slow modes of a unit that they got wrong and what of it is in the sum [-], and the
+# variance of its fast modes [rad^2/s^2].
 (
     FAST_STARTED,
     SLOW_STARTED,
@@ -23,19 +24,24 @@ SLOW_INNOVATION = 2
     BLIND,
     SLOW_WAIT,
     STEP,
-    LEAN,
-    LEANING,
-) = range(12)
-MEMORY_ENTRIES = 12
+    MEAN,
+    COUNT,
+    LEFT,
+    TAKEN,
+    RISING,
+) = range(15)
+MEMORY_ENTRIES = 15
 # Entries of `setting`: step [s]; crossover and slope gain of the settled loop [rad/s], [rad^2/s^2]; its proportional
 # gain over the crossover [-]; density of the slow path's noise [rad^2/s]; variance of the slow path alone
-# [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor
-# counts as missing; the rate of rest, NaN if the start is unknown [rad/s]; what is left after a step of what
-# the slow path got wrong at its start [-].
+# [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor counts as missing; the rate of
+# rest, NaN if the start is unknown [rad/s]; what is left of the slow modes after a step [-].
 PERIOD, CROSSOVER, SLOPE_GAIN, GAIN, DENSITY, ALONE, TURN, POWER, PATIENCE, REST, UPRIGHT = range(11)
 # The fast path's drift by itself [rad^2/s^3], the fast reading at rest [rad/s], and the share of a change that the fast
-# sensor forgets in a second [1/s]; variance that slow noise leaves behind the settled loop [rad^2/s^2].
-DRIFT, REST_READING, FORGOTTEN, SLOW = range(11, 15)
+# sensor forgets in a second [1/s]; variance that slow noise leaves behind the settled loop [rad^2/s^2]; the slow
+# reading at rest [rad/s]; what an alternating rate leaves in the slow modes if they begin at its first value [rad/s];
+# variance of the fast modes there [rad^2/s^2] and what is left of it after a step [-]; readings that the mean at the
+# beginning is over [-], and how many make a radian of the alternating rate [-].
+DRIFT, REST_READING, FORGOTTEN, SLOW, REST_SLOW, LEAN, ROUGH, CALM, MEAN_OVER, RADIAN = range(11, 21)
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,19 +72,51 @@ def advance(x, moved, Phi, Gamma, ramp, before, step):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
+def lean_variance(memory, setting):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return what the slow modes have put into the sum [rad^2/s^2]: of a sine of any phase the mean over t is
+    1 / (sqrt(2) pi f t).
+    """
+    lean = memory[TAKEN] * setting[LEAN] * min(1.0, setting[RADIAN] / max(memory[COUNT], 1.0))
+    return lean * lean
+
+
+@njit(cache=True, error_model="numpy")
+def begin_slow(x, still, memory, setting, z, unknown):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Put the slow path in equilibrium with a reading: that of a known rest, or one whose mean is not known yet."""
+    for i in range(x.size):
+        x[i] = still[i] * z
+    if unknown:
+        memory[VARIANCE] += lean_variance(memory, setting)
+        memory[MEAN], memory[COUNT], memory[LEFT], memory[TAKEN] = z, 1.0, 1.0, 0.0
+        memory[RISING] = setting[ROUGH]
+
+
+@njit(cache=True, error_model="numpy")
+def follow_mean(x, C, slow_still, memory, setting, z):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Move the slow modes to where they were if they had begun in equilibrium with the mean of the readings, and with
+    them what they have put into the sum.
+    """
+    memory[COUNT] += 1.0
+    change = (z - memory[MEAN]) / memory[COUNT]
+    memory[MEAN] += change
+    for i in range(x.size):
+        x[i] += slow_still[i] * change * memory[LEFT]
+        memory[ADDED] += C[i] * slow_still[i] * change * memory[TAKEN]
+
+
+@njit(cache=True, error_model="numpy")
 def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fast, slow, out):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915  # pragma: no cover
     """Run both paths and the loop between them over a block.
 
-    A path is (Phi, Gamma, ramp, C, D, still), `still` its states in equilibrium with a unit input. `fast` has a reading
-    at every step, `slow` where it is not NaN; infinite is a missing one. `settled` (n_step,) is the error variance of
-    the cycle of slow readings.
+    A path is (Phi, Gamma, ramp, C, D, still), `still` its states in equilibrium with a unit input; of the slow one its
+    slow modes by themselves stand behind it. `fast` has a reading at every step, `slow` where it is not NaN; infinite
+    is a missing one. `settled` (n_step,) is the error variance of the cycle of slow readings.
     """
     Phi, Gamma, ramp, C, D, still = fast_path
-    Phi_slow, Gamma_slow, _, C_slow, D_slow, still_slow = slow_path
+    Phi_slow, Gamma_slow, _, C_slow, D_slow, still_slow, modes = slow_path
     moved, moved_slow = np.empty(x_fast.size), np.empty(x_slow.size)
     T, crossover = setting[PERIOD], setting[CROSSOVER]
     final = setting[DENSITY] * crossover
-    turn = np.tanh(crossover * T)
     for k in range(fast.size):
         out[SLOW_INNOVATION, k] = np.nan
         seen = np.isfinite(fast[k])
@@ -98,11 +136,17 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
                 x_fast[i] = still[i] * fast[k]
         if memory[SLOW_STARTED] > 0.0:
             advance(x_slow, moved_slow, Phi_slow, Gamma_slow, Gamma_slow, memory[HELD], 0.0)
+            memory[LEFT] *= setting[UPRIGHT]
+            memory[RISING] *= setting[CALM]
         memory[SLOW_WAIT] += 1.0
         if np.isfinite(slow[k]):
-            if memory[SLOW_STARTED] == 0.0:
-                for i in range(x_slow.size):
-                    x_slow[i] = still_slow[i] * slow[k]
+            if memory[SLOW_STARTED] == 0.0 and not np.isnan(setting[REST]):
+                begin_slow(x_slow, still_slow, memory, setting, setting[REST_SLOW], False)
+                memory[HELD] = setting[REST_SLOW]
+            elif memory[SLOW_STARTED] == 0.0 or memory[SLOW_WAIT] >= setting[PATIENCE]:
+                begin_slow(x_slow, still_slow, memory, setting, slow[k], True)
+            elif 0.0 < memory[COUNT] < setting[MEAN_OVER]:
+                follow_mean(x_slow, C_slow, modes, memory, setting, slow[k])
             memory[SLOW_STARTED], memory[HELD], memory[SLOW_WAIT] = 1.0, slow[k], 0.0
         alone = output(x_slow, C_slow, D_slow, memory[HELD])
         carried = output(x_fast, C, D, memory[READING])
@@ -116,28 +160,31 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
             memory[BLIND] += T
         gone = departure(setting, memory[BLIND])
         if memory[SLOW_STARTED] > 0.0 and memory[SLOW_WAIT] < setting[PATIENCE]:
-            # The slow path alone is never worse than this, and w = p / N^2 follows w' = w_c^2 - w^2.
-            w = min(memory[VARIANCE], setting[ALONE]) / setting[DENSITY]
+            by_itself = setting[ALONE] + memory[RISING]
             e = alone - carried - memory[ADDED]
             if np.isfinite(slow[k]):
                 out[SLOW_INNOVATION, k] = e
+            # Beside a fast sensor only until the loop has settled.
+            if memory[VARIANCE] + gone >= by_itself and (memory[VARIANCE] > final or not seen):
+                memory[ADDED] += e
+                memory[TAKEN], memory[VARIANCE] = memory[LEFT], by_itself
+                e, gone = 0.0, 0.0
             if seen:
+                # w = p / N^2 follows w' = w_c^2 - w^2. While its fast modes last, which err alike for so long, the slow
+                # path is the noisier one, and the crossover c lower.
+                density = setting[DENSITY] - 2.0 * T * memory[RISING] / np.log(setting[CALM])
+                c = crossover * np.sqrt(setting[DENSITY] / density)
+                w, turn = memory[VARIANCE] / density, np.tanh(c * T)
                 gain = max(w, setting[GAIN] * min(w, crossover))
                 share = 1.0 - np.exp(-gain * T)
                 memory[ADDED] += share * e + T * memory[SLOPE]
-                memory[LEANING] += share * (memory[LEAN] - memory[LEANING])
+                memory[TAKEN] += share * (memory[LEFT] - memory[TAKEN])
                 memory[SLOPE] += T * setting[SLOPE_GAIN] * e
-                memory[VARIANCE] = setting[DENSITY] * crossover * (w + crossover * turn) / (crossover + w * turn)
-            elif memory[FAST_STARTED] == 0.0 or memory[VARIANCE] + gone >= setting[ALONE]:
-                memory[ADDED] += e
-                memory[LEANING], memory[VARIANCE] = memory[LEAN], setting[ALONE]
-                gone = 0.0
+                memory[VARIANCE] = density * c * (w + c * turn) / (c + w * turn)
         else:
             memory[ADDED] += T * memory[SLOPE]
             if started:
                 memory[VARIANCE] += setting[DRIFT] * T
-        if memory[SLOW_STARTED] > 0.0:
-            memory[LEAN] *= setting[UPRIGHT]
         step = int(memory[STEP])
         rate = carried + memory[ADDED]
         if not started:
@@ -146,5 +193,5 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
         # Before the loop has settled its part is more, after a known rest less, but the fast path's stays.
         loop = max(settled[step] + memory[VARIANCE] - final, 0.1 * settled[step]) + gone
         loop += setting[SLOW] * min(memory[VARIANCE] / final, 1.0)
-        out[STD, k] = np.sqrt(loop + memory[LEANING] * memory[LEANING])
+        out[STD, k] = np.sqrt(loop + lean_variance(memory, setting))
         memory[STEP] = (step + 1) % settled.size

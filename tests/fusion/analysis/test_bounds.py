@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from testbed.fusion.analysis import bounds
 from testbed.fusion.analysis.bounds import never_settles, run_bounds, settled_bounds
 from testbed.fusion.analysis.optimum import optimum
 from testbed.fusion.belief import SensorBelief
@@ -119,3 +120,20 @@ def test_a_turn_on_bias_is_the_bound_of_a_constant_rate_unless_the_rest_is_known
     rest = run_bounds(biased, RATES, [MIXED], start="rest", window=(10.0, 20.0))[0]
     assert unknown.rmse == pytest.approx(0.2 * DEG, rel=0.05, abs=0.0)
     assert rest.rmse < 0.01 * DEG
+
+
+def test_a_signal_may_change_its_order_when_the_search_is_refined(monkeypatch):
+    """Of two signals with orders 2 and 3, both are better off with the refined order 2: none is left of order 3."""
+
+    class Search:
+        def __init__(self, *_):
+            pass
+
+        def best(self, order, q):
+            coarse = {1: (9.0, 9.0), 2: (2.0, 4.0), 3: (8.0, 3.0)}[order]
+            found = coarse if q.size > 10 else (1.0, 1.0)
+            return [bounds.SignalBound(rmse, rmse, 0.0, order, 1.0) for rmse in found]
+
+    monkeypatch.setattr(bounds, "_Search", Search)
+    found = settled_bounds(SMALL, {"slow": 1.25}, [[(1.0, DEG)], [(2.0, DEG)]])
+    assert [one.rmse for one in found] == [1.0, 1.0]

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from testbed.fusion.analysis.optimum import optimum
+from testbed.fusion.analysis.even import most_even
+from testbed.fusion.analysis.optimum import optimum, settled_filters
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.filters.steady_state import SteadyState, SteadyStateParameters
+from testbed.fusion.model import build_model
+from testbed.signals import LinearFilter
 
 if TYPE_CHECKING:
     from testbed.fusion import EstimateBlock
@@ -38,7 +41,9 @@ def both(readings: dict[str, FloatArray]) -> tuple[EstimateBlock, EstimateBlock]
     """Return the settling filter and the Kalman filter of its model."""
     best = optimum(QUICK, RATES, [(10.0, DEG)])
     kalman = Kalman(QUICK, RATES, KalmanParameters(order=best.order, q=best.q, coloured=False))
-    return SteadyState(QUICK, RATES, SteadyStateParameters(coloured=False)).process(readings), kalman.process(readings)
+    return SteadyState(QUICK, RATES, SteadyStateParameters(frequency=10.0, coloured=False)).process(
+        readings
+    ), kalman.process(readings)
 
 
 @pytest.mark.oracle
@@ -79,7 +84,7 @@ def test_the_cycle_of_gains_follows_the_clock_and_not_the_first_reading() -> Non
     late = {key: values.copy() for key, values in readings.items()}
     late["mhd_ars"][:13], late["mems_gyro"][:2] = np.nan, np.nan
     whole, begun = (
-        SteadyState(QUICK, RATES, SteadyStateParameters(coloured=False, gate=False)).process(one)
+        SteadyState(QUICK, RATES, SteadyStateParameters(frequency=10.0, coloured=False, gate=False)).process(one)
         for one in (readings, late)
     )
     assert np.unique(whole.std[-100:]).size == 10
@@ -102,6 +107,61 @@ def test_amplitude_opens_the_filter(reference: Any) -> None:
     readings = reference.readings(reference.sines((10.0, 1.0), duration=0.2), 8)
     belief = load_belief("eq39")
     small, large = (
-        SteadyState(belief, RATES, SteadyStateParameters(amplitude=a * DEG)).process(readings) for a in (0.01, 10.0)
+        SteadyState(belief, RATES, SteadyStateParameters(frequency=10.0, amplitude=a * DEG)).process(readings)
+        for a in (0.01, 10.0)
     )
     assert large.std[-1] > small.std[-1]
+
+
+@pytest.mark.oracle
+def test_without_a_frequency_no_sine_costs_much_more_than_its_optimum() -> None:
+    """The largest ratio over 0.1 to 500 Hz, by the optima of single sines; any one sine's own design has a larger."""
+    belief = load_belief("eq39")
+    even = most_even(belief, RATES, DEG)
+    frequencies = (0.1, 1.0, 10.0, 100.0, 500.0)
+
+    def ratios(order: int, q: float) -> list[float]:
+        filters = settled_filters(belief, RATES, order=order, q=np.array([q]))
+        truth = np.array([belief[name].realisation().response(np.array(frequencies)) for name in RATES])
+        lag = filters.line_error(np.array(frequencies), truth)[0] ** 2 * DEG**2 / 2.0
+        errors = np.sqrt(filters.noise_variance().sum() + lag)
+        return [e / optimum(belief, RATES, [(f, DEG)]).rmse for e, f in zip(errors, frequencies, strict=True)]
+
+    assert max(ratios(even.order, even.q)) <= even.largest_ratio * (1.0 + 1e-9)
+    for frequency in (0.1, 10.0, 500.0):
+        own = optimum(belief, RATES, [(frequency, DEG)])
+        assert max(ratios(own.order, own.q)) >= max(ratios(even.order, even.q))
+
+
+def test_in_a_gap_q_is_the_design_of_the_sensors_that_are_left() -> None:
+    """Bit i of the number of a set is sensor i: of the gyro alone its own even design, of the MHD sensor alone, which
+    sees no constant and never settles, that of both.
+    """
+    belief = load_belief("eq39")
+    found = SteadyState(belief, RATES, SteadyStateParameters(coloured=False))
+    both = most_even(belief, RATES, DEG)
+    alone = most_even(belief, {"mems_gyro": RATES["mems_gyro"]}, DEG, orders=(both.order,))
+    assert alone.q < both.q
+    gyro = list(RATES).index("mems_gyro")
+    for number, q in ((1 << gyro, alone.q), (3 - (1 << gyro), both.q), (3, both.q)):
+        wanted = build_model(belief, RATES, order=both.order, q=q).Q
+        np.testing.assert_allclose(found._Q[number], wanted, rtol=1e-12)
+
+
+def test_without_any_sensor_the_rate_departs_by_three_amplitudes_at_most() -> None:
+    """The claim ends at (3 A)^2 beside that of the last reading; the estimate goes no further than two claims."""
+    t = np.arange(40_000) / RATES["mhd_ars"]
+    rate = DEG * np.sin(6.0 * np.pi * t)
+    belief = load_belief("eq39")
+    readings = {
+        name: np.asarray(
+            LinearFilter(list(belief[name].numerator), list(belief[name].denominator), RATES["mhd_ars"]).process(rate)
+        )[:: round(RATES["mhd_ars"] / RATES[name])]
+        for name in RATES
+    }
+    lost = {name: np.where(np.arange(z.size) < z.size // 2, z, np.nan) for name, z in readings.items()}
+    block = SteadyState(belief, RATES, SteadyStateParameters(coloured=False, gate=False)).process(lost)
+    most = np.sqrt(block.std[19_999] ** 2 + (3.0 * DEG) ** 2)
+    assert block.std.max() <= max(most, block.std[:19_999].max()) * (1.0 + 1e-9)
+    assert block.std[-1] == pytest.approx(most, rel=1e-3)
+    assert np.max(np.abs(block.rate[20_000:] - block.rate[19_999])) < 2.0 * most

@@ -13,6 +13,8 @@ from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.kernels.covariance import (
     CONVENTIONAL,
     JOSEPH,
+    LOST_VARIANCE,
+    SQUARE_ROOT,
     gain_root,
     kalman_kernel,
     predict_root,
@@ -89,16 +91,16 @@ def test_single_precision_differs_but_stays_near(
 @pytest.mark.oracle
 @pytest.mark.parametrize("form", [CONVENTIONAL, JOSEPH])
 def test_single_precision_is_single_throughout(form: int) -> None:
-    """One state, F = Q = H = 1: the same operations in numpy's float32 give the same bits, so no sum is formed in
+    """One state, F = H = 1: the same operations in numpy's float32 give the same bits, so no sum is formed in
     double.
     """
-    one, R = np.ones((1, 1), np.float32), np.float32(0.3)
-    Z = random_stream(3, "single").standard_normal((1, 200))
+    one, Q, R = np.ones((1, 1), np.float32), np.float32(0.01), np.float32(0.003)
+    Z = 0.1 * random_stream(3, "single").standard_normal((1, 200))
     out = np.empty((4, 200))
-    x, P = np.float32(0.0), np.float32(7.0)
-    kalman_kernel(1, 1, form)(x * one[0], P * one, one, one, one, R * one[0], Z, np.zeros(1, dtype=int), False, out)
+    x, P = np.float32(0.0), np.float32(0.07)
+    kalman_kernel(1, 1, form)(x * one[0], P * one, one, Q * one, one, R * one[0], Z, np.zeros(1, dtype=int), False, out)
     for k, z in enumerate(Z[0].astype(np.float32)):
-        P = P + np.float32(k > 0)
+        P = P + Q * np.float32(k > 0)
         K, e = P / (R + P), z - x
         x, short = x + K * e, P - K * P
         P = short if form == CONVENTIONAL else short - (-R * K + short) * K
@@ -220,3 +222,28 @@ def test_square_root_divides_into_blocks_bit_for_bit(readings: dict[str, FloatAr
     ]
     assert np.array_equal(np.concatenate([part.rate for part in parts]), whole.rate)
     assert np.array_equal(np.concatenate([part.std for part in parts]), whole.std)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("form", [JOSEPH, SQUARE_ROOT])
+def test_a_rate_that_is_lost_goes_back_as_if_read_at_zero(form: int) -> None:
+    """Without a reading P grows to LOST_VARIANCE and no further: the Kalman update with z = 0 and
+    R = V P / (P - V) leaves V for the rate, and its share for what goes with it.
+    """
+    n, F, Q = 2, np.array([[1.0, 0.5], [0.0, 1.0]]), np.diag([0.1, 0.2])
+    P, x, H = np.array([[0.6, 0.1], [0.1, 0.5]]), np.array([0.3, 2.0]), np.array([[1.0, 0.0]])
+    expected_x, expected_P = x.copy(), P.copy()
+    for _ in range(5):
+        expected_x, expected_P = F @ expected_x, F @ expected_P @ F.T + Q
+        spread = expected_P[0, 0]
+        if spread > LOST_VARIANCE:
+            C = spread + LOST_VARIANCE * spread / (spread - LOST_VARIANCE)
+            K = expected_P[:, :1] / C
+            expected_x, expected_P = expected_x - K[:, 0] * expected_x[0], expected_P - K @ (H @ expected_P)
+    out, Z = np.empty((4, 5)), np.full((1, 5), np.nan)
+    carried, noise = (covariance_root(one) if form == SQUARE_ROOT else one for one in (P, Q))
+    kalman_kernel(n, 1, form)(x, carried, F, noise, H, np.array([1.0]), Z, np.zeros(1, dtype=int), True, out)
+    left = carried @ carried.T if form == SQUARE_ROOT else carried
+    assert expected_P[0, 0] == pytest.approx(LOST_VARIANCE)
+    np.testing.assert_allclose(left, expected_P, rtol=1e-12)
+    np.testing.assert_allclose(x, expected_x, rtol=1e-12)
