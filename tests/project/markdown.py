@@ -1,6 +1,6 @@
 """Give the pages one sentence a line, of at most 120 characters: `python -m tests.project.markdown`.
 
-Tables, code, directives, HTML and front matter stay as they are; what a page says does not change.
+Tables, code, directives and HTML stay as they are; what a page says does not change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ WIDTH = 120
 # Code, links and formulas are not broken; a blank inside one is held by this.
 _HELD = re.compile(r"`[^`]*`|\[[^\]]*\]\([^)]*\)|\$[^$]*\$")
 _BLANK = "\u2060"
-_SHORT = "".join(rf"(?<!\b{word}\.)" for word in (r"e\.g", r"i\.e", "et al", "vs", "cf"))
+_SHORT = "".join(rf"(?<!\b{word}\.)" for word in (r"e\.g", r"i\.e", "et al", "vs", "cf", "Trans", "Instrum", "Meas"))
 _END = re.compile(rf"(?<=[.!?]){_SHORT} +(?=[A-Z`*\[(\"0-9])")
 _ITEM = re.compile(r"^(\s*)(?:[-*]|\d+\.|:)\s+")
 _VERBATIM = re.compile(r"^\s*(?:\||#|<|>|:{3,}|\(|\[[^\]]+\]:|---|={3,}|$)")
@@ -44,7 +44,8 @@ def blocks(text: str) -> Iterator[tuple[bool, list[str]]]:
             fence = "" if fence else mark[1]
             plain = False
         else:
-            plain = not fence and not _VERBATIM.match(line)
+            # Four blanks begin code, unless they go on with an item.
+            plain = not fence and not _VERBATIM.match(line) and (bool(prose) or not line.startswith("    "))
         if plain and _ITEM.match(line) and prose:
             yield True, prose
             prose = []

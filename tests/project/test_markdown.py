@@ -14,8 +14,8 @@ def test_a_page_has_one_sentence_a_line(page):
 
 
 def test_code_tables_and_links_stay_whole_and_sentences_are_parted():
-    text = "One. Two `a b. C` three.\nFour\n\n| a. B | c |\n\n```\nx. Y\n```\n- item one. Item two [a link](b c).\n"
+    text = "One. Two `a b. C` three.\nFour\n\n| a. B | c |\n\n```\nx. Y\n```\n\n    a = b. C\n    d = e\n\n- item one. Item two [a link](b c).\n"
     assert reflowed(text) == (
-        "One.\nTwo `a b. C` three.\nFour\n\n| a. B | c |\n\n```\nx. Y\n```\n- item one.\n  Item two [a link](b c).\n"
+        "One.\nTwo `a b. C` three.\nFour\n\n| a. B | c |\n\n```\nx. Y\n```\n\n    a = b. C\n    d = e\n\n- item one.\n  Item two [a link](b c).\n"
     )
     assert max(len(line) for line in reflowed("word " * 60).splitlines()) <= 120
