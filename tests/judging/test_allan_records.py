@@ -75,7 +75,7 @@ def test_rounded_times_are_even(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("", {"rate": "1"}, "log.csv: expected a column of numbers, got nothing"),
+        ("", {"rate": "1"}, "log.csv: expected a recording, got an empty file"),
         ("rate\n", {"rate": "1"}, "expected a column of numbers, got 'rate'"),
         ("1\n2\n3\n", {"rate": "1"}, "expected at least 4 samples, got 3"),
         ("rate\n1\n2\nx\n4\n", {"rate": "1"}, "log.csv:4: expected a finite number in 'rate', got 'x'"),

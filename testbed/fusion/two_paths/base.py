@@ -107,6 +107,7 @@ class TwoPaths(BlockFilter):
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
+        self.model.check_cycle()
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
@@ -272,7 +273,8 @@ def _best_alone(
         lag = power * abs(1.0 - at(band, freq_hz) * come) ** 2
         return math.log(lag + alone_variance(slow, band, sample_rate_hz))
 
-    bounds = math.log(1.0), math.log(sample_rate_hz / 8.0)
+    highest = sample_rate_hz / 8.0
+    bounds = math.log(min(1.0, 0.1 * highest)), math.log(highest)
     best = minimize_scalar(error, bounds=bounds, method="bounded", options={"xatol": 1e-2})
     return band_of(math.exp(best.x)), math.exp(best.fun)
 

@@ -40,9 +40,8 @@ def noise_variance(paths: Paths, model: FusionModel, slow: int, fast: int) -> Fl
     Raises
     ------
     ValueError
-        If the error does not settle: the loop around the slow sensor is unstable; or the cycle is too long.
+        If the error does not settle: the loop around the slow sensor is unstable.
     """
-    model.check_cycle()
     M, W, read = _joint_steps(paths, model, slow, fast)
     around = functools.reduce(lambda done, step: step @ done, M)
     if np.max(np.abs(np.linalg.eigvals(around))) >= 1.0:
