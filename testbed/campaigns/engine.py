@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Tasks that are under way for each worker: one runs, the others wait beside it.
 _AHEAD = 3
+# How long a scheduler is waited for [s].
+_PATIENCE = 30.0
 LOOPBACK = "127.0.0.1"
 
 
@@ -89,7 +91,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     from distributed import Client, SubprocessCluster
 
     # Nothing of Dask's is published, and no worker is given up for what it holds.
-    quiet = {"distributed.worker.memory.terminate": False, "distributed.comm.timeouts.connect": "30s"}
+    quiet = {"distributed.worker.memory.terminate": False, "distributed.comm.timeouts.connect": _PATIENCE}
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
         try:
             if scheduler is None:
@@ -104,7 +106,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
                 )
                 client = stack.enter_context(Client(cluster))
             else:
-                client = stack.enter_context(Client(scheduler, timeout=30))
+                client = stack.enter_context(Client(scheduler, timeout=_PATIENCE))
         except (OSError, TimeoutError, ValueError) as error:
             where = "a cluster on this machine" if scheduler is None else scheduler
             msg = f"{where} cannot be reached: {error}"

@@ -25,8 +25,8 @@ Coefficient = Annotated[float, Field(allow_inf_nan=False)]
 Coefficients = Annotated[tuple[Coefficient, ...], Field(max_length=33)]
 
 _CLOSEST_POLES = 1e-3
-# Readings are rates in rad/s, so a gain far from 1 is a mistake of units at least.
-_LEAST_GAIN, _HIGHEST_HZ = 1e-12, 1e4
+# Readings are rates in rad/s: beyond this, or its inverse, noise referred to the rate has no number.
+_LEAST_GAIN, _HIGHEST_HZ = 1e-30, 1e4
 
 
 @dataclass(frozen=True)

@@ -352,7 +352,7 @@ def test_a_library_that_is_missing_is_named_with_the_line_that_installs_it(tmp_p
         (b"\x1f\x8b" + bytes(100), "gunzip it first"),
         (b"PK\x03\x04" + bytes(100), "cannot be read"),
         (b"\xd0\xcf\x11\xe0" + bytes(100), "save the sheet as CSV"),
-        (b"", "got nothing"),
+        (b"", "got an empty file"),
         (b"   \n\n", "got nothing"),
         (b"%PDF-1.7", "a PDF document"),
         (b"\x89HDF\r\n\x1a\n" + bytes(50), "HDF5"),

@@ -188,14 +188,12 @@ def test_arrays_have_no_exact_belief():
 
 
 def test_a_filter_that_cannot_take_a_belief_is_refused_by_its_name(tmp_path):
-    gyro = "mems_gyro: {type: fog, preset: fog_paper3}"
+    mhd = "mhd_ars: {numerator: [1, 0], denominator: [1, 60], output_noise: 100 nrad/s/sqrt(Hz)}"
+    # A zero on the right: it goes the wrong way first, and its inverse runs away.
+    gyro = "mems_gyro: {numerator: [-0.001, 1], denominator: [1e-6, 3e-3, 1], output_noise: 50 urad/s/sqrt(Hz)}"
+    belief = f"belief: {{{mhd}, {gyro}}}"
     with pytest.raises(testbed.ScenarioError) as caught:
-        short(
-            tmp_path,
-            ("mems_gyro: {preset: adis16505_filtered}", gyro),
-            ("kalman: {}", "complementary: {belief: exact}"),
-            ("arw_shakf: {}", "kalman: {belief: exact}"),
-        )
+        short(tmp_path, ("kalman: {}", f"complementary: {{{belief}}}"), ("arw_shakf: {}", f"kalman: {{{belief}}}"))
     assert [problem.key for problem in caught.value.problems] == ["fusion.complementary"]
     assert "inverse is stable" in caught.value.problems[0].message
 

@@ -339,7 +339,7 @@ def test_load_reads_outside_the_folder_when_told_to(tmp_path):
         ("t,w\n0,1\n0.01,inf\n", "finite number"),
         ("secret\n\nt,w\n0,1\n0.01\nx,y,z\n", "record.csv"),
         ("t,w\n" + "0," + "9" * 200_000 + "\n", "finite number"),
-        ("", "column of numbers"),
+        ("", "expected a recording, got an empty file"),
         ("t,w\n0,1\n", "at least 4 samples"),
         ("t,w\n" + "1" * 100 + "x,1\n", "got '1111"),
     ],

@@ -48,8 +48,9 @@ class SteadyStateParameters(CommonParameters):
 
 
 class SteadyState(BlockFilter):
-    r"""Kalman filter that stops computing its covariance once it has settled, order and q those of the `optimum` of a
-    sine, or the ones that no sine makes much worse than its own.
+    r"""Kalman filter that stops computing its covariance once it has settled, made for a sine or evenly for all.
+
+    Order and q are those of the `optimum` of the sine, or the ones that no sine makes much worse than its own.
 
     .. math:: x^- = F x, \quad x = x^- + K_p (z - H x^-)
 
