@@ -37,7 +37,8 @@ def with_preset(name: str, entry: Mapping[str, Any]) -> dict[str, Any]:
     """
     base = preset(__name__, name)
     kind = entry.get("type", base["type"])
-    if kind in SENSORS:
+    # What else may stand there is found where the whole entry is read.
+    if isinstance(kind, str) and kind in SENSORS:
         base = lay_over(base, entry, resolve("sensor", kind, SENSORS).ways())
     return merge(base, entry)
 

@@ -195,6 +195,7 @@ def test_load_of_the_resolved_scenario_gives_the_same_run(tmp_path):
         ("{q: 0.1 (deg/s)^2/s}", "{type: 5}", 13, "fusion.kalman.type", "expected a name, got 5"),
         ("{q: 0.1 (deg/s)^2/s}", "{type: [kalman]}", 13, "fusion.kalman.type", "expected a name"),
         ("preset: sx300", "preset: sx300, type: 5", 10, "sensors.mhd_ars.type", "expected a name, got 5"),
+        ("preset: sx300", "preset: sx300, type: [mhd_ars]", 10, "sensors.mhd_ars.type", "expected a name"),
         ("seed: 7", f"seed: {2**63}", 2, "seed", "less than or equal to 9223372036854775807"),
         ("seed: 7", f"bandwidth: {'9' * 400} Hz", 2, "bandwidth", "got a text of 403 characters"),
         ('"< 0.0143"', "0.0143", 15, "expect.kalman.rmse_deg_s", "such as '< 0.0143'"),
