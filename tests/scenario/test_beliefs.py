@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import statistics
 
 import numpy as np
 import pytest
@@ -214,9 +213,10 @@ def test_a_gyro_of_another_bandwidth_costs_little_with_its_own_belief(tmp_path):
     )
     (tmp_path / "mixed.yaml").write_text(mixed, encoding="utf-8")
     scenario = load_scenario(tmp_path / "mixed.yaml")
-    # Most of the error is the gyro's slow noise over the window: one seed tells little, the median of five does.
-    runs = [testbed.run(scenario, seed=seed).metrics["fusion"] for seed in range(5)]
-    errors = {name: statistics.median(run[name]["rmse_deg_s"] for run in runs) for name in runs[0]}
+    # Most of the error is the gyro's slow noise over the window, so that one seed tells little: the worst of eight.
+    runs = testbed.evaluate(scenario.with_(**{"turntable.engine": "modal"}), range(8))
+    errors = {name: max(run.fusion[name].rmse_deg_s for run in runs) for name in runs[0].fusion}
+    print(errors)
     assert set(errors) == {"kalman", "shakf", "arw_shakf"}
     assert max(errors.values()) <= 0.0035, errors
 
