@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Annotated, Any, Self
 
@@ -132,7 +133,7 @@ def _span(ends: tuple[Any, Any]) -> tuple[float, float, str]:
     found = []
     for end in ends:
         match = _NUMBER.fullmatch(str(end))
-        if isinstance(end, bool) or match is None:
+        if isinstance(end, bool) or match is None or not math.isfinite(float(match[1])):
             msg = f"expected two numbers with their unit, such as ['0.5 Hz', '500 Hz'], got {end!r}"
             raise ValueError(msg)
         found.append((float(match[1]), match[2].strip()))

@@ -156,6 +156,8 @@ def _write_part(path: Path, table: pa.Table) -> None:
 
 
 def _refuse_others(folder: Path, study: Mapping[str, Any]) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise ScenarioError([Problem("exists and is no folder: choose another --out", file=str(folder))])
     if not folder.exists() or not any(folder.iterdir()):
         return
     try:

@@ -118,6 +118,9 @@ def test_a_folder_of_something_else_or_in_use_is_refused(done, tmp_path):
     (tmp_path / "mine" / "notes.txt").write_text("mine")
     with pytest.raises(ScenarioError, match="is no sweep"):
         sweep(study, out=tmp_path / "mine")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(ScenarioError, match="is no folder"):
+        sweep(study, out=tmp_path / "file")
     with (
         CaseStore(tmp_path / "out", study.document(), schema_of(study)),
         pytest.raises(ScenarioError, match="in use by another sweep"),
