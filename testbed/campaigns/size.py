@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from testbed.campaigns.agenda import CHUNK
 from testbed.campaigns.lockstep import Lockstep
+from testbed.chain.forecast import memory_so_far
 
 if TYPE_CHECKING:
     from testbed.campaigns.study import Study
@@ -62,7 +61,7 @@ def size_of(study: Study, workers: int = 1) -> Size:
         cases=len(study.cases),
         runs=len(study.cases) * len(study.seeds),
         cpu_seconds=chunks * (start + share * per_sample * scenario.n_time),
-        memory_bytes=workers * _memory(),
+        memory_bytes=workers * memory_so_far(),
         disk_bytes=_ROW_BYTES * rows,
     )
 
@@ -78,9 +77,3 @@ def sweep_words(size: Size) -> str:
     spent = f"{size.cpu_seconds:.0f} s" if size.cpu_seconds < 600.0 else f"{size.cpu_seconds / 60.0:.0f} min"
     room = f"{size.memory_bytes / 1e6:.0f} MB of memory, {size.disk_bytes / 1e6:.3g} MB of disk"
     return f"{size.cases} cases, at most {size.runs} runs, about {spent} of processor time, {room}"
-
-
-def _memory() -> int:
-    """Return the most memory that the process had so far [byte]; Linux counts in KiB."""
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most if sys.platform == "darwin" else 1024 * most

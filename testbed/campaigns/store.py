@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import io
 import json
 import os
 import shutil
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from testbed.errors import Problem, ScenarioError
-from testbed.runs.atomic import exchange, sync_tree, write_text
+from testbed.runs.atomic import exchange, sync_tree, write_bytes, write_text
 from testbed.runs.leftovers import beside
 
 if TYPE_CHECKING:
@@ -144,15 +144,9 @@ def read_cases(folder: Path, columns: list[str] | None = None) -> pa.Table:
 def _write_part(path: Path, table: pa.Table) -> None:
     import pyarrow.parquet as pq
 
-    partial = path.with_name(f".{path.name}")
-    pq.write_table(table, partial)
-    with partial.open("rb") as stream:
-        os.fsync(stream.fileno())
-    partial.replace(path)
-    with contextlib.suppress(OSError):
-        folder = os.open(path.parent, os.O_RDONLY)
-        os.fsync(folder)
-        os.close(folder)
+    content = io.BytesIO()
+    pq.write_table(table, content)
+    write_bytes(path, content.getvalue())
 
 
 def _refuse_others(folder: Path, study: Mapping[str, Any]) -> None:

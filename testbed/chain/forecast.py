@@ -80,13 +80,13 @@ def forecast(scenario: Scenario, outputs: Sequence[str] = OUTPUTS) -> Forecast:
     return Forecast(
         samples,
         spent * samples + _SECONDS_PER_BYTE * disk + _FIXED,
-        _memory() + _LIBRARIES + round(per_block),
+        memory_so_far() + _LIBRARIES + round(per_block),
         disk,
         chain.step,
     )
 
 
-def _memory() -> int:
+def memory_so_far() -> int:
     """Return the most memory that the process had so far [byte]; Linux counts in KiB."""
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most if sys.platform == "darwin" else 1024 * most

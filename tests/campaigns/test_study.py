@@ -110,7 +110,7 @@ def test_an_engine_that_the_base_names_stays(tmp_path):
             "vary: {duration: {random: [1 s, 2 s], points: 3}, settle: {random: [0 s, 1 s], points: 4}}",
             "same points on all drawn axes",
         ),
-        ("vary: {seed: [1, 2]}", "no column of the rows"),
+        ("vary: {seed: [1, 2]}", "expected no axis of seeds"),
         ("vary: {duration: {linear: [1e400 s, 2 s], points: 2}}", "expected two numbers with their unit"),
         ("seeds: 0", "seeds"),
         ("seeds: {until: {rmse: 0 %}, most: 10}", "rmse"),
