@@ -33,7 +33,7 @@ DIAGNOSTICS = {  # prefix of the name: quantity and unit
     "innovation_variance_": ("Innovation variance", "(rad/s)²"),
     "S_": ("Factor S of R", "-"),
     "Q_": ("Process noise Q", "(rad/s)²"),
-    "std": ("Predicted std", "rad/s"),
+    "std": ("Claimed std", "rad/s"),
     "": ("Diagnostic", ""),
 }
 

@@ -367,7 +367,7 @@ def test_digest_pairs_each_reading_with_the_truth_at_its_instant(tmp_path: Path)
 
 
 def test_digest_coverage_and_spectrum_of_a_white_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """White error of the predicted std: 95.45 % inside, and a density std^2 / fs; small blocks do not change a bit of
+    """White error of the claimed std: 95.45 % inside, and a density std^2 / fs; small blocks do not change a bit of
     it.
     """
     folder = make_run(tmp_path / "run", metrics_of(4.0, 3.0, ("kalman",)))
