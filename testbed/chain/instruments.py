@@ -71,9 +71,7 @@ class Instruments:
         steps = {name: self.rates[name] / self.rates["base"] for name in self._fusion}
         return sum(steps[name] * stage.untried_seconds for name, stage in self._fusion.items())
 
-    def _block(
-        self, command: CommandBlock, truth: TruthBlock, way: Callable[[WatchedFilter], Estimation]
-    ) -> RunBlock:
+    def _block(self, command: CommandBlock, truth: TruthBlock, way: Callable[[WatchedFilter], Estimation]) -> RunBlock:
         readings, profiles = {}, {}
         for name in self._sensors:
             readings[name], profile = self._sensed(name, truth)

@@ -83,8 +83,8 @@ def longest(readings: Readings) -> int:
 
     Parameters
     ----------
-    readings : mapping of str to ndarray
-        By sensor.
+    readings : mapping of str to ndarray, shape (n_due,)
+        By sensor [rad/s].
     """
     return max(values.size for values in readings.values())
 
@@ -108,4 +108,4 @@ def joined(parts: Sequence[EstimateBlock]) -> EstimateBlock:
 
 def _undefined(block: EstimateBlock) -> EstimateBlock:
     gone = np.full(block.rate.size, np.nan)
-    return EstimateBlock(gone, gone, {name: gone for name in block.diagnostics})
+    return EstimateBlock(gone, gone, dict.fromkeys(block.diagnostics, gone))

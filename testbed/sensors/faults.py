@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -47,8 +48,7 @@ def first_overlap(faults: Sequence[Fault]) -> tuple[Fault, Fault] | None:
         In any order.
     """
     ordered = sorted(faults, key=lambda fault: fault.at)
-    pairs = zip(ordered, ordered[1:], strict=False)
-    return next(((one, other) for one, other in pairs if other.at < one.end), None)
+    return next(((one, other) for one, other in pairwise(ordered) if other.at < one.end), None)
 
 
 class FaultStage:
