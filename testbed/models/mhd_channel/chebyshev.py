@@ -147,7 +147,7 @@ def even_transport(intervals: int) -> tuple[FloatArray, FloatArray]:
     pinned = first.copy()
     pinned[0] = 0.0
     pinned[0, 0] = 1.0
-    integral: FloatArray = np.linalg.inv(pinned)
+    integral = np.asarray(np.linalg.inv(pinned), np.float64)
     integral[:, 0] = 0.0
     return _folded(first), _folded(integral)
 
