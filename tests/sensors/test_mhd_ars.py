@@ -148,7 +148,7 @@ def test_input_noise_is_the_output_noise_over_the_response() -> None:
 
 
 def test_every_parameter_is_among_the_options() -> None:
-    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting"}
+    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting", "faults"}
 
 
 @pytest.mark.parametrize("key", OPTIONS)
