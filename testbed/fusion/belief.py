@@ -169,7 +169,9 @@ class SensorBelief(Part):
         that shape.
         """
         freq = np.asarray(freq_hz, float)
-        value: ComplexArray = transfer(self.numerator, self.denominator, freq) * np.exp(-2j * np.pi * freq * self.delay)
+        value: ComplexArray = transfer(list(self.numerator), list(self.denominator), freq) * np.exp(
+            -2j * np.pi * freq * self.delay
+        )
         return value
 
     def transfer_function(self) -> control.TransferFunction:
@@ -224,8 +226,8 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     Parameters
     ----------
     source : str or mapping
-        Name of a shipped belief, a YAML file of one (a name that ends in ``.yaml``), or sensor name -> `SensorBelief` or
-        its fields (SI floats or strings with units).
+        Name of a shipped belief, a YAML file of one (a name that ends in ``.yaml``), or sensor name -> `SensorBelief`
+        or its fields (SI floats or strings with units).
 
     Returns
     -------
