@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
+    from testbed.identification.session import identify_sensors
     from testbed.logs import read_log
     from testbed.models.motions import list_motions
     from testbed.notebook import Run, open_run
@@ -100,6 +101,7 @@ __all__ = [
     "belief_of",
     "estimate",
     "evaluate",
+    "identify_sensors",
     "line_of_sight",
     "list_filters",
     "list_motions",
@@ -125,6 +127,7 @@ _LAZY = {
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
+    "identify_sensors": "testbed.identification.session",
     "line_of_sight": "testbed.chain.sight",
     "open_sweep": "testbed.campaigns.sweep",
     "sweep": "testbed.campaigns.sweep",

@@ -12,6 +12,7 @@ from testbed.cli.commands import (
     compensate,
     design,
     folder,
+    identify,
     log,
     parts,
     pointing,
@@ -37,6 +38,7 @@ app.command()(folder.view)
 app.command()(folder.report)
 app.command()(allan.allan)
 app.command()(psd.psd)
+app.command()(identify.identify)
 app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)
