@@ -84,7 +84,7 @@ def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list
     """Print the columns that have a value, a line under each kind of source, names in the colour of their signal."""
     cells = [row for kind in rows for row in kind]
     table = Table()
-    kept = [i for i in range(len(headings)) if i < 2 or any(row[i] != NOTHING for row in cells)]
+    kept = [0, *([i for i in range(1, len(headings)) if any(row[i] != NOTHING for row in cells)] or [1])]
     for i in kept:
         table.add_column(headings[i], justify="right" if i else "left", no_wrap=True)
     for kind in rows:

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
 
 _REMEDY = "write 'belief: exact' for the simulator's own response and noise, or what is believed of it"
+_OF_RECORDING = (
+    "name the channels of the recording as the belief does, leave out those that are no sensors, or write what is "
+    "believed of it"
+)
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Fusion:
         What the presets of the sensors say of them.
     turntable : TurntableParameters or None
         What carries them, which rests at t = 0.
+    simulated : bool, optional
+        Whether there is a table at all: the filters of a recording know nothing of its start unless they are told.
     """
 
     intake: Intake
@@ -45,6 +51,7 @@ class Fusion:
     types: Mapping[str, str]
     data_sheets: Mapping[str, SensorBelief | None]
     turntable: TurntableParameters | None
+    simulated: bool = True
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
@@ -88,7 +95,7 @@ class Fusion:
         """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at
         the Earth's rate where that is on.
         """
-        if "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
+        if not self.simulated or "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
             return {}
         earth = None if self.turntable is None else self.turntable.earth_rate
         return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
@@ -100,7 +107,7 @@ class Fusion:
         """Return what a filter believes of each sensor; None, with the findings noted, if not of all."""
         if written is None:
             return self._of_presets(key)
-        if written == EXACT:
+        if written == EXACT and self.simulated:
             return self._exact(key)
         known = self._named(written, key)
         return None if known is None else self._of_types(known, key)
@@ -131,7 +138,7 @@ class Fusion:
             one = known.get(name, known.get(kind))
             if one is None:
                 words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                self._find(key, f"{words}; {_REMEDY}")
+                self._find(key, f"{words}; {_REMEDY if self.simulated else _OF_RECORDING}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None
@@ -141,7 +148,7 @@ class Fusion:
         if isinstance(written, str):
             try:
                 return load_belief(written)
-            except UnknownNameError as error:
+            except ValueError as error:
                 self._find(key, str(error))
                 return None
         if not isinstance(written, dict):
