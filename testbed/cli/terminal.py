@@ -70,7 +70,8 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
 
 def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
     """Yield what the filters knew of the start, and what their front part struck out."""
-    for start, words in (("rest", "knew that the table rests at t = 0"), ("unknown", "knew nothing of the start")):
+    rests = "the table rests" if metrics.replay is None else "all rests"
+    for start, words in (("rest", f"knew that {rests} at t = 0"), ("unknown", "knew nothing of the start")):
         if names := [name for name, source in metrics.fusion.items() if source.start == start]:
             yield f"start: {', '.join(names)} {words}"
     for name, source in metrics.fusion.items():

@@ -76,8 +76,8 @@ class ReplayJudge:
             std = estimate.std[settled:]
             self._variance[name][0] += float(std @ std)
             self._variance[name][1] += std.size
-            error = np.zeros(0) if known is None else (estimate.rate[settled:] - reference["base"][settled:])[known]
-            self._consistency[name].add(error, std if known is None else std[known], estimate.diagnostics, settled)
+            error = estimate.rate[settled:] - reference["base"][settled:] if self._reference else std
+            self._consistency[name].add(error[known], std[known], estimate.diagnostics, settled)
 
     def _add(
         self,
@@ -93,14 +93,11 @@ class ReplayJudge:
         settled = int(np.searchsorted(times, self._settle * (1.0 - 1e-12)))
         self._spreads[name].add(rate[settled:])
         if not self._reference:
-            return settled, None
+            return settled, slice(0, 0)
         truth = reference[clock][settled:]
         known = np.isfinite(truth)
-        t = times[settled:]
-        # The same array for all sources of a clock, whose waves are worked out once.
-        t = t if known.all() else t[known]
         claimed = None if std is None else std[settled:][known]
-        self._errors[name].add(t, rate[settled:][known], truth[known], claimed)
+        self._errors[name].add(times[settled:][known], rate[settled:][known], truth[known], claimed)
         return settled, known
 
     def result(self) -> dict[str, Any]:

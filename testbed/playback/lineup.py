@@ -59,6 +59,15 @@ class Lineup:
         """Number of samples of the base clock."""
         return max(values.size for values in self.readings.values())
 
+    def times(self) -> dict[str, FloatArray]:
+        """Return the stamps of ``base`` and of every sensor, shape (n_time,) [s]."""
+        found = {name: np.arange(values.size) / self.rates[name] for name, values in self.readings.items()}
+        return {"base": np.arange(self.n_time) / self.rates["base"], **found}
+
+    def stamps(self) -> dict[str, FloatArray] | None:
+        """Return the same where the clocks have no whole ratios; None on the integer path, where k / rate says all."""
+        return None
+
     @property
     def duration(self) -> float:
         """Length of the time base [s]."""

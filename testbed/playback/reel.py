@@ -70,6 +70,27 @@ class Reel:
             return np.arange(self.rate.size) / (NANO * self.sample_rate_hz)
         return (self.stamps_ns - self.start_ns).astype(np.float64)
 
+    def stamps(self) -> NDArray[np.int64]:
+        """Return the stamp of each sample, shape (n_time,) [ns]."""
+        if self.stamps_ns is not None:
+            return self.stamps_ns
+        return self.start_ns + np.rint(self.times_ns()).astype(np.int64)
+
+    def put_right(self, rate: FloatArray, stamps_ns: NDArray[np.int64]) -> Reel:
+        """Return the reel with other readings [rad/s] and stamps [ns], of which an even clock stays one."""
+        moved = replace(self, rate=rate)
+        if np.array_equal(stamps_ns, self.stamps()):
+            return moved
+        exact = exact_rate(stamps_ns, np.arange(stamps_ns.size), 1.0) if self.stamps_ns is None else None
+        mean = (stamps_ns.size - 1) / (NANO * float(stamps_ns[-1] - stamps_ns[0]))
+        return replace(
+            moved,
+            start_ns=int(stamps_ns[0]),
+            sample_rate_hz=exact or mean,
+            stamps_ns=None if exact is not None else stamps_ns,
+            stated=False,
+        )
+
     def from_place(self, first: int) -> Reel:
         """Return the reel without its first samples."""
         if not first:

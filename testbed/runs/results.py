@@ -109,7 +109,8 @@ class RunRecord:
         known = {name: source.rmse_deg_s for name, source in self.metrics.fusion.items()}
         errors = [f"{name} {'undefined' if rmse is None else f'{rmse:.4g} deg/s'}" for name, rmse in known.items()]
         place = [] if self.folder is None else [str(self.folder)]
-        head = f"{self.metrics.scenario}, {self.metrics.duration_s:g} s, seed {self.metrics.seed}"
+        made = "replayed" if self.metrics.seed is None else f"seed {self.metrics.seed}"
+        head = f"{self.metrics.scenario}, {self.metrics.duration_s:g} s, {made}"
         return f"<Run {'; '.join([head, *([', '.join(errors)] if errors else []), *place])}>"
 
 
