@@ -76,8 +76,9 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
     console.print(f"{scenario.name}: {scenario.file}", soft_wrap=True)
     if frame.description:
         console.print(frame.description, soft_wrap=True)
+    begin = f"filters from {frame.fusion_from:g} s on, " if frame.fusion_from else ""
     console.print(
-        f"{frame.duration:g} s at {scenario.base_rate_hz:g} Hz, metrics from {frame.settle:g} s on, "
+        f"{frame.duration:g} s at {scenario.base_rate_hz:g} Hz, {begin}metrics from {frame.settle:g} s on, "
         f"seed {frame.seed}: {size_words(size)}",
         soft_wrap=True,
     )

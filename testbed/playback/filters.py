@@ -69,7 +69,7 @@ def filter_specs(
         if start is not None:
             entry["start"] = start
     intake = Intake(document, Path(document.file).resolve().parent if document.file else Path(), plugins)
-    specs = Fusion(intake, {}, {name: name for name in sensors}, {}, None, simulated=False).read(entries)
+    specs = Fusion(intake, {}, {name: name for name in sensors}, {}, None, at_rest=False, simulated=False).read(entries)
     document.refuse()
     return specs
 

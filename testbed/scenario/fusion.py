@@ -42,8 +42,10 @@ class Fusion:
         What the presets of the sensors say of them.
     turntable : TurntableParameters or None
         What carries them, which rests at t = 0.
+    at_rest : bool
+        Whether the filters see that: their first readings are those of t = 0.
     simulated : bool, optional
-        Whether there is a table at all: the filters of a recording know nothing of its start unless they are told.
+        Whether the sensors are instruments of the simulator, of which it knows what they exactly are.
     """
 
     intake: Intake
@@ -51,6 +53,7 @@ class Fusion:
     types: Mapping[str, str]
     data_sheets: Mapping[str, SensorBelief | None]
     turntable: TurntableParameters | None
+    at_rest: bool
     simulated: bool = True
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
@@ -95,7 +98,8 @@ class Fusion:
         """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at
         the Earth's rate where that is on.
         """
-        if not self.simulated or "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
+        told = entry.get("start", "rest" if self.at_rest else "unknown")
+        if "start" not in getattr(model, "model_fields", {}) or told != "rest":
             return {}
         earth = None if self.turntable is None else self.turntable.earth_rate
         return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
