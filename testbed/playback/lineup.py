@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 FEWEST = 4
 # As the filters take rates for whole multiples.
 _SAME = 1e-9
+# Instants that are one [ns].
+_SAME_NS = 0.5
 # Beyond this many steps of the reference from its nearest known samples there is no reference.
 _REACH = 1.5
 
@@ -208,5 +210,5 @@ def _interpolated(reference: Reel, wanted: FloatArray) -> FloatArray:
     after = np.clip(np.searchsorted(times, wanted), 1, times.size - 1)
     far = times[after] - times[after - 1] > _REACH / (NANO * reference.sample_rate_hz)
     # Between two samples one of which is lost, and outside of the record, nothing is known.
-    found[far | (wanted < times[0]) | (wanted > times[-1])] = np.nan
+    found[far | (wanted < times[0] - _SAME_NS) | (wanted > times[-1] + _SAME_NS)] = np.nan
     return found

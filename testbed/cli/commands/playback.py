@@ -30,7 +30,7 @@ def replay(
     log: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[LOG]...",
+            metavar="LOG",
             help="Recording of any format, in consecutive files if there are several; a map; or a run folder. "
             "Default: the files that the map names.",
         ),
