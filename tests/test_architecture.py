@@ -164,7 +164,8 @@ def test_a_public_name_has_one_meaning():
 
 
 PUBLIC = {
-    "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError read_log replay",
+    "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError read_log "
+    "replay export",
     "testbed.cli": "main",
     "testbed.models.mhd_channel": "MhdChannel Fluid one_mode_response",
     "testbed.models.turntable": "Turntable TurntableParameters Mounting",

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.chain.pointing import LinesOfSight
 import numpy as np
 
+from testbed.chain.pointing import LinesOfSight
 from testbed.document import Document
 from testbed.errors import Problem, ScenarioError
 from testbed.inputs.plain import plain_tree
@@ -95,7 +95,9 @@ def _check_recording(run: RunRecord, folder: str) -> None:
         lost = np.isnan(run.truth.read("rate", start, start + BLOCK))
         if lost.any():
             at = (start + int(np.argmax(lost))) / run.truth.sample_rate_hz
-            raise ScenarioError([Problem(f"the reference is not known from {at:.6g} s on: cut the record", file=folder)])
+            raise ScenarioError(
+                [Problem(f"the reference is not known from {at:.6g} s on: cut the record", file=folder)]
+            )
 
 
 def _with_pointing(scenario: Scenario, given: str | Path | Mapping[str, Any]) -> Scenario:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 
-class Spread:
+class RateSpread:
     """Mean and standard deviation of the finite samples of a rate, and how many are none.
 
     The sums are taken about the first sample, so that a large constant costs no digits.

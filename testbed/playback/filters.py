@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 _WHAT = "fusion (filters by name, as in a scenario)"
 # Paper 1's equation (39), as `testbed.estimate` has it.
 _DEFAULT_BELIEF = "eq39"
-_FILES = {".yaml", ".yml"}
+
+
+def is_yaml(name: str) -> bool:
+    """Return whether a text names a file of beliefs or filters, and none of these."""
+    return Path(name).suffix.lower() in {".yaml", ".yml"}
 
 
 def filter_specs(
@@ -91,7 +95,7 @@ def _entries(document: Document) -> dict[str, Any]:
 
 def _belief(given: str | Path | Mapping[str, Any] | None) -> Any:
     """Return a belief as an entry has it: a name, or what is believed of each sensor."""
-    if given is None or (isinstance(given, str) and Path(given).suffix.lower() not in _FILES):
+    if given is None or (isinstance(given, str) and not is_yaml(given)):
         return given
     if not isinstance(given, str | Path):
         return {name: dump(one) if isinstance(one, SensorBelief) else one for name, one in given.items()}

@@ -21,7 +21,6 @@ _MOST_DIGITS = 17
 # Stamps are whole nanoseconds, each rounded or cut.
 _ROUNDING_NS = 1.0
 _PARTS, _FEWEST_IN_PART = 1000, 4
-_FINE = {"xatol": 0.0, "maxiter": 200}
 
 
 def exact_rate(stamps: Stamps, index: Stamps, quantum_ns: float) -> float | None:
@@ -55,7 +54,7 @@ def exact_rate(stamps: Stamps, index: Stamps, quantum_ns: float) -> float | None
         return float(np.ptp(residual - places * change)) - most
 
     furthest = most / last
-    best = float(minimize_scalar(excess, bounds=(-furthest, furthest), method="bounded", options=_FINE).x)
+    best = float(minimize_scalar(excess, bounds=(-furthest, furthest), method="bounded").x)
     if excess(best) > 0.0:
         return None
     ends = [end if excess(end) <= 0.0 else brentq(excess, best, end) for end in (-furthest, furthest)]

@@ -10,7 +10,7 @@ from testbed.fusion.belief import declared
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
 from testbed.metrics.line_fit import Waves
-from testbed.metrics.spread import Spread
+from testbed.metrics.spread import RateSpread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,7 +58,7 @@ class ReplayJudge:
             name: ErrorMetrics(waves.get(name, waves["base"]), gaps=name in sensors, span=span)
             for name in (*sensors, *specs)
         }
-        self._spreads = {name: Spread() for name in (*sensors, *specs)}
+        self._spreads = {name: RateSpread() for name in (*sensors, *specs)}
         self._variance: dict[str, list[float]] = {name: [0.0, 0.0] for name in specs}
         self._consistency = {name: Consistency(known=reference) for name in specs}
         self._gated: dict[str, dict[str, int]] = {}
@@ -70,7 +70,11 @@ class ReplayJudge:
             self._add(name, name, block.first[name], readings, reference)
         for name, estimate in block.fusion.items():
             self._gated.setdefault(name, {}).update(
-                {key.removeprefix(_GATED): int(n[-1]) for key, n in estimate.diagnostics.items() if key.startswith(_GATED)}
+                {
+                    key.removeprefix(_GATED): int(n[-1])
+                    for key, n in estimate.diagnostics.items()
+                    if key.startswith(_GATED)
+                }
             )
             settled, known = self._add(name, "base", block.start, estimate.rate, reference, estimate.std)
             std = estimate.std[settled:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -202,13 +203,20 @@ def at_instants(reference: Reel, base: Reel, n_time: int) -> FloatArray:
 
 
 def _interpolated(reference: Reel, wanted: FloatArray) -> FloatArray:
+    """Return the reference at instants [ns] by a spline through each stretch without a gap: what is lost reaches no
+    further, and between two samples one of which is lost nothing is known.
+    """
     known = np.isfinite(reference.rate)
-    times = reference.times_ns()[known]
-    if times.size < FEWEST:
-        return np.full(wanted.size, np.nan)
-    found: FloatArray = make_interp_spline(times, reference.rate[known], k=3)(wanted)
-    after = np.clip(np.searchsorted(times, wanted), 1, times.size - 1)
-    far = times[after] - times[after - 1] > _REACH / (NANO * reference.sample_rate_hz)
-    # Between two samples one of which is lost, and outside of the record, nothing is known.
-    found[far | (wanted < times[0] - _SAME_NS) | (wanted > times[-1] + _SAME_NS)] = np.nan
+    times, rate = reference.times_ns()[known], reference.rate[known]
+    found = np.full(wanted.size, np.nan)
+    gaps = np.flatnonzero(np.diff(times) > _REACH / (NANO * reference.sample_rate_hz)) + 1
+    for first, stop in itertools.pairwise([0, *gaps.tolist(), times.size]):
+        if stop - first < 2:
+            continue
+        inside = slice(
+            int(np.searchsorted(wanted, times[first] - _SAME_NS)),
+            int(np.searchsorted(wanted, times[stop - 1] + _SAME_NS)),
+        )
+        spline = make_interp_spline(times[first:stop], rate[first:stop], k=min(3, stop - first - 1))
+        found[inside] = spline(wanted[inside])
     return found

@@ -53,7 +53,7 @@ def start_filters(specs: Mapping[str, FilterSpec], lineup: Lineup) -> dict[str, 
     return started
 
 
-def play(lineup: Lineup, filters: Mapping[str, CheckedFilter], length: int = BLOCK) -> Iterator[PlayedBlock]:
+def play_through(lineup: Lineup, filters: Mapping[str, CheckedFilter], length: int = BLOCK) -> Iterator[PlayedBlock]:
     """Yield what the filters make of a recording, block by block; the result does not depend on their length.
 
     Parameters

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +18,14 @@ from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
 from testbed.notebook import Run, open_run
 from testbed.playback.description import description
-from testbed.playback.filters import filter_specs
+from testbed.playback.filters import filter_specs, is_yaml
 from testbed.playback.judge import ReplayJudge
-from testbed.playback.lineup import Lineup, line_up
 from testbed.playback.judged import finding_entry, judged
-from testbed.playback.player import play, start_filters
+from testbed.playback.lineup import Lineup, line_up
+from testbed.playback.player import play_through, start_filters
 from testbed.playback.reel import Reel, wind
-from testbed.playback.source import Source, open_source
 from testbed.playback.sinks import replay_sinks
+from testbed.playback.source import ReplaySource, open_source
 from testbed.runs.block import first_due
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.metrics import ReplayMetrics, RunMetrics
@@ -33,12 +34,12 @@ from testbed.runs.results import MemoryStore
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
+    from testbed.chain.sinks import Sink
     from testbed.fusion.analysis.finding import Verdict
     from testbed.logs.channel import Log
     from testbed.logs.logmap import LogMap
-    from testbed.chain.sinks import Sink
     from testbed.runs.block import PlayedBlock
     from testbed.scenario.model import FilterSpec
     from testbed.signals import FloatArray
@@ -55,7 +56,7 @@ class Playback:
 
     Parameters
     ----------
-    source : Source
+    source : ReplaySource
         Where it is from.
     lineup : Lineup
         Its sensors on one time base.
@@ -73,7 +74,7 @@ class Playback:
         What was loaded.
     """
 
-    source: Source
+    source: ReplaySource
     lineup: Lineup
     specs: Mapping[str, FilterSpec]
     facts: ReplayMetrics
@@ -109,15 +110,15 @@ def replay(
     plugins: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> Run:
-    """Send a recording through filters.
+    r"""Send a recording through filters.
 
     Parameters
     ----------
     log : Log, str, Path or sequence of these
         What `testbed.read_log` returned; or the recording, in consecutive files if there are several, a map that names
         it, or a run folder.
-    filters : iterable of str, mapping, str or Path, optional
-        Names of filters; or filters by name with parameters, as under `fusion` in a scenario, or a file of them.
+    filters : iterable of str, str, mapping or Path, optional
+        Names of filters, also with commas between them; or filters by name with parameters, as under `fusion` in a scenario, or a file of them.
     map : LogMap, mapping, str or Path, optional
         Which channel is what; without it the file's own words must say enough. The channel that is called
         ``reference`` is taken for the truth; every other rate is a sensor.
@@ -162,8 +163,8 @@ def replay(
     >>> import pathlib, tempfile
     >>> folder = pathlib.Path(tempfile.mkdtemp())
     >>> for name, n in (("mhd_ars", 20_000), ("mems_gyro", 2_000)):
-    ...     rows = "".join(f"{k * 1_000_000_000 // n},{k % 2}e-5\\n" for k in range(n))
-    ...     _ = (folder / f"{name}.csv").write_text("t [ns],w [rad/s]\\n" + rows)
+    ...     rows = "".join(f"{k * 1_000_000_000 // n},{k % 2}e-5\n" for k in range(n))
+    ...     _ = (folder / f"{name}.csv").write_text("t [ns],w [rad/s]\n" + rows)
     >>> channels = {n: {"file": folder / f"{n}.csv", "column": "w"} for n in ("mhd_ars", "mems_gyro")}
     >>> run = replay([], ["kalman"], map={"channels": channels})
     >>> run.fusion["kalman"].rate.shape, run.metrics.replay.reference
@@ -191,15 +192,12 @@ def prepare(
     """Read a recording and what it is to go through; arguments as `replay`, names of filters and a file of them may
     both be given.
     """
-    from testbed.logs.channel import Log
-
     if start not in {None, "unknown", "rest"}:
         raise ScenarioError([Problem(f"expected unknown or rest, got {start!r}", "--start")])
     loaded = load_plugins(plugins)
     source = open_source([log] if isinstance(log, str | Path) else log, map)
-    given = filters if isinstance(filters, dict | str | Path) else fusion
-    names = () if given is filters else filters
-    specs = filter_specs(source.sensors, names, given, belief, start, loaded)
+    names, file = _asked(filters)
+    specs = filter_specs(source.sensors, names, fusion if file is None else file, belief, start, loaded)
     reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, fix=fix)
     reference = None if source.reference is None else wind(source.reference, middle=True)
     lineup = line_up(reels, reference, source.log)
@@ -210,6 +208,17 @@ def prepare(
     _check_lines(lines, lineup)
     facts = _facts(source, reels, lineup)
     return Playback(source, lineup, specs, facts, chosen_settle, found, tuple(sorted(lines)), loaded.used)
+
+
+def _asked(
+    filters: Iterable[str] | Mapping[str, Any] | str | Path,
+) -> tuple[Iterable[str], Mapping[str, Any] | str | Path | None]:
+    """Return names of filters, and filters with parameters or their file."""
+    if isinstance(filters, str) and not is_yaml(filters):
+        return filters.split(","), None
+    if isinstance(filters, Mapping | str | Path):
+        return (), filters
+    return filters, None
 
 
 def play_back(
@@ -257,7 +266,7 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
     lineup = made.lineup
     known = lineup.reference is not None
     judge = ReplayJudge(lineup.times(), made.settle, lineup.duration, made.specs, made.lines, reference=known)
-    for part in play(lineup, start_filters(made.specs, lineup), block):
+    for part in play_through(lineup, start_filters(made.specs, lineup), block):
         judge.write(part, _reference(part, lineup))
         for sink in sinks:
             sink.write(part)
@@ -301,7 +310,7 @@ def _check_lines(lines: Sequence[float], lineup: Lineup) -> None:
         raise ScenarioError([Problem(message, "--lines")])
 
 
-def _facts(source: Source, reels: Sequence[Reel], lineup: Lineup) -> ReplayMetrics:
+def _facts(source: ReplaySource, reels: Sequence[Reel], lineup: Lineup) -> ReplayMetrics:
     channels: dict[str, Any] = {}
     for reel in reels:
         channel = source.sensors[reel.name]

@@ -28,7 +28,7 @@ REFERENCE = "reference"
 
 
 @dataclass(frozen=True)
-class Source:
+class ReplaySource:
     """The channels of a recording that are rates or angles.
 
     Parameters
@@ -54,7 +54,7 @@ class Source:
 
 def open_source(
     logs: Sequence[str | Path] | Log, map: LogMap | Mapping[str, Any] | str | Path | None = None
-) -> Source:
+) -> ReplaySource:
     """Return the channels to be replayed.
 
     Parameters
@@ -109,7 +109,7 @@ def _map_of_run(folder: Path) -> LogMap:
     return LogMap.model_validate({"channels": channels}, context={"border": True})
 
 
-def _unmapped(files: Sequence[Path]) -> Source:
+def _unmapped(files: Sequence[Path]) -> ReplaySource:
     if not files:
         message = "expected a recording: name a file, or a map that does with --map"
         raise ScenarioError([Problem(message, "LOG")])
@@ -118,10 +118,11 @@ def _unmapped(files: Sequence[Path]) -> Source:
         raise ScenarioError([Problem(message, "--map")])
     proposed = propose(open_table(files[0]))
     plans = [one for one in proposed.plans if one.quantity in ROTATIONS]
-    left = [text for one in plans if (text := unsaid(one))]
+    others = tuple(f"{one.name}: " for one in proposed.plans if one not in plans)
+    left = [text for text in proposed.open if not text.startswith(others)] if any(map(unsaid, plans)) else []
     if not plans or left:
         remedy = f"testbed log inspect {files[0]} --out log.yaml writes a map to fill in; give it with --map"
-        words = dict.fromkeys(left or [*proposed.open, "no column is a rate or an angle by its unit"])
+        words = left or [*proposed.open, "no column is a rate or an angle by its unit"]
         raise ScenarioError([Problem(f"to be said: {text}", "--map", str(files[0])) for text in words] + [
             Problem(remedy, "--map", str(files[0]))
         ])  # fmt: skip
@@ -135,7 +136,7 @@ def _named(one: Plan, plans: Sequence[Plan]) -> Plan:
     return replace(one, name=name) if short.count(name) == 1 else one
 
 
-def _source(place: Path, channels: Mapping[str, LogChannel]) -> Source:
+def _source(place: Path, channels: Mapping[str, LogChannel]) -> ReplaySource:
     turning = {name: one for name, one in channels.items() if one.quantity in ROTATIONS or one.kind is not None}
     others = [name for name in channels if name not in turning]
     notes = (f"{', '.join(others)}: neither a rate nor an angle, left out",) if others else ()
@@ -145,4 +146,4 @@ def _source(place: Path, channels: Mapping[str, LogChannel]) -> Source:
         raise refusal(place, "expected a channel that is a rate or an angle beside the reference, got none")
     stem = place.resolve().name.split(".")[0]
     name = place.resolve().parent.name if stem in {"log", "run", "data"} else stem
-    return Source(name or "recording", str(place), sensors, reference, notes)
+    return ReplaySource(name or "recording", str(place), sensors, reference, notes)

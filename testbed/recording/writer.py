@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import mujoco
     from numpy.typing import NDArray
 
-    from testbed.fusion.base import EstimateBlock
     from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
 
@@ -118,7 +117,7 @@ class RecordingWriter:
         """Add the next block of the run."""
         if isinstance(block, PlayedBlock):
             self._write_rates(block.sensors, block.reference)
-            self._write_estimates(block.fusion, block.reference)
+            self._write_estimates(block, block.reference)
         else:
             self._write_run(block)
 
@@ -131,7 +130,7 @@ class RecordingWriter:
             key, drift = f"sensors/{name}", block.drifts[name]
             self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
             self._add(f"/truth/{name}/drift", drift, 1, f"{name} [rad/s]", key, detailed=False)
-        self._write_estimates(block.fusion, truth[-block.start % self._fusion_stride :: self._fusion_stride])
+        self._write_estimates(block, truth[-block.start % self._fusion_stride :: self._fusion_stride])
         self._write_sights(block)
         self._write_poses(block)
 
@@ -142,8 +141,8 @@ class RecordingWriter:
             key = f"sensors/{name}"
             self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
 
-    def _write_estimates(self, fusion: Mapping[str, EstimateBlock], reference: FloatArray | None) -> None:
-        for name, estimate in fusion.items():
+    def _write_estimates(self, block: RunBlock | PlayedBlock, reference: FloatArray | None) -> None:
+        for name, estimate in block.fusion.items():
             key, stride = f"fusion/{name}", self._fusion_stride
             self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
             if reference is not None:

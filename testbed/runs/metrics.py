@@ -263,8 +263,8 @@ class FindingMetrics(Entry):
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
-    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it; `scenario`
-    is its name, and there is no `seed`.
+    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it;
+    `scenario` is its name, and there is no `seed`.
 
     Examples
     --------

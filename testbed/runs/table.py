@@ -46,6 +46,7 @@ def error_cells(source: SourceMetrics, scale: float) -> list[str]:
     """
     errors = (source.rmse_deg_s, source.rmse_aligned_deg_s, source.mean_std_deg_s)
     ratios = (source.over(source.floor_rmse_deg_s), source.over(source.optimum_rmse_deg_s))
+
     def shown(rates: tuple[float | None, ...]) -> list[str]:
         return [number(None if rate is None else scale * rate) for rate in rates]
 

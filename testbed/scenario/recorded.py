@@ -1,6 +1,4 @@
-"""A replayed recording read back as a scenario: its frame, clocks, filters and beliefs, for what is done with a finished
-run.
-"""
+"""A replayed recording read back as a scenario: frame, clocks, filters and beliefs, for what is done afterwards."""
 
 from __future__ import annotations
 
@@ -43,7 +41,7 @@ class RecordedSensor:
 
 @dataclass(frozen=True)
 class RecordedScenario(Scenario):
-    """A recording that was replayed: a frame and filters, without table and motion, on the clock of the fastest sensor."""
+    """A recording that was replayed: frame and filters, no table and no motion, on the clock of the fastest sensor."""
 
     @property
     def base_rate_hz(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
-PAGES = [*TUTORIALS, ROOT / "docs" / "howto.md", ROOT / "docs" / "reference" / "run_folder.md"]
+PAGES = [
+    *TUTORIALS,
+    ROOT / "docs" / "howto.md",
+    ROOT / "docs" / "replay.md",
+    ROOT / "docs" / "reference" / "run_folder.md",
+]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -36,7 +42,7 @@ def test_what_it_tells_to_type_works(page, tmp_path, monkeypatch, capsys):
 
 def commands(text):
     for line in text.splitlines():
-        word, *arguments = line.split()
+        word, *arguments = shlex.split(line)
         # What installs is tried by whoever clones the repository.
         if word != "make":
             assert word == "testbed"

@@ -41,11 +41,15 @@ def replay(
     ] = None,
     filter_: Annotated[
         str | None,
-        typer.Option("--filter", metavar="LIST", help="Filters by name, such as kalman,wideband.", autocompletion=_filters),
+        typer.Option(
+            "--filter", metavar="LIST", help="Filters by name, such as kalman,wideband.", autocompletion=_filters
+        ),
     ] = None,
     fusion: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.yaml", help="Filters with parameters, as under fusion in a scenario, or a scenario."),
+        typer.Option(
+            metavar="FILE.yaml", help="Filters with parameters, as under fusion in a scenario, or a scenario."
+        ),
     ] = None,
     belief: Annotated[
         str | None,
@@ -53,9 +57,13 @@ def replay(
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(metavar="unknown|rest", help="What the filters know of the start; default that of --fusion, or unknown."),
+        typer.Option(
+            metavar="unknown|rest", help="What the filters know of the start; default that of --fusion, or unknown."
+        ),
     ] = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Put right sign, unit, gain, offset and rate that are found wrong.")] = False,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Put right sign, unit, gain, offset and rate that are found wrong.")
+    ] = False,
     settle: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="Judge from here on; default a tenth of the record, at most 10 s."),
