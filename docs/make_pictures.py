@@ -1,4 +1,4 @@
-"""Draw the pictures of the README: `python docs/make_pictures.py RUN_DIR`, the folder of a run of the mixed scenario."""
+"""Draw the pictures of the README: `python docs/make_pictures.py RUN_DIR`, a run of the mixed scenario."""
 
 from __future__ import annotations
 

@@ -21,8 +21,9 @@ def first(mapping, count=1):
 # What makes a program small: new values of its globals by what it has; its arguments; a word of what it then prints.
 SMALL = {
     "baselines": (
-        lambda its: {"SIGNALS": first(its.SIGNALS), "COMPARED": ("kalman", "complementary"), "DURATION": 2.0}
-        | {"SETTLE": 1.0},
+        lambda its: (
+            {"SIGNALS": first(its.SIGNALS), "COMPARED": ("kalman", "complementary"), "DURATION": 2.0} | {"SETTLE": 1.0}
+        ),
         ["1"],
         "x optimum",
     ),
@@ -44,7 +45,7 @@ SMALL = {
     ),
     "identify_paper2": (lambda _its: {}, [], "largest error"),
     "mode_groups": (
-        lambda its: {"SEEDS": range(2), "record": lambda day=its.record(): day[::20]},
+        lambda its: {"SEEDS": range(2), "record": (lambda day: lambda: day[::20])(its.record())},
         [],
         "single modes move by",
     ),

@@ -31,7 +31,8 @@ def test_it_is_valid_says_what_it_is_about_and_holds_no_output(path):
 def test_it_runs(path, tmp_path):
     nbclient = pytest.importorskip("nbclient")
     book = nbformat.read(path, as_version=4)
-    nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
+    place = {"metadata": {"path": tmp_path}}
+    nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources=place).execute()
     code = [cell for cell in book.cells if cell.cell_type == "code"]
     # The last cell shows what the notebook was about.
     assert any(output.output_type == "execute_result" for output in code[-1].outputs)
