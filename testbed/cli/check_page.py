@@ -56,7 +56,7 @@ def warnings(scenario: Scenario) -> list[str]:
     if seen < whole:
         base = scenario.base_rate_hz
         shown = f"{seen / base:.3g} s in windows spread over {whole / base:g} s"
-        windows = [f"motion: peaks of rate and torque are those of {shown}"]
+        windows = [f"motion: peaks of rate and torque and the stroke are those of {shown}"]
     return [*doubts(scenario), *windows]
 
 

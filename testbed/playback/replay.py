@@ -118,7 +118,8 @@ def replay(
         What `testbed.read_log` returned; or the recording, in consecutive files if there are several, a map that names
         it, or a run folder.
     filters : iterable of str, str, mapping or Path, optional
-        Names of filters, also with commas between them; or filters by name with parameters, as under `fusion` in a scenario, or a file of them.
+        Names of filters, also with commas between them; or filters by name with parameters, as under `fusion` in a
+        scenario, or a file of them.
     map : LogMap, mapping, str or Path, optional
         Which channel is what; without it the file's own words must say enough. The channel that is called
         ``reference`` is taken for the truth; every other rate is a sensor.

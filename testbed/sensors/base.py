@@ -218,6 +218,16 @@ class Sensor(Part):
         """Return what does not fit together although each value may be right, for people to read."""
         return []
 
+    def beyond(self, rate: float, stroke: float) -> list[str]:
+        """Return where a motion leaves what the model of the instrument holds for, for people to read.
+
+        Parameters
+        ----------
+        rate, stroke : float
+            Its largest rate [rad/s], and half of the angle between its extreme positions [rad].
+        """
+        return []
+
     @abstractmethod
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
         """Return indicated over true rate, noise-free, in continuous time.
