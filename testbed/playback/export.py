@@ -74,7 +74,8 @@ def export(run_dir: str | Path, format: str, out: str | Path | None = None) -> P
     with RunFolder(target) as folder, failing_as_run_error(str(target)):
         places = write(folder.path, tracks)
         _write_map(folder.path / MAP, run, tracks, places)
-        return folder.finish({"run": str(run_dir), "format": format})
+        folder.finish({"run": str(run_dir), "format": format})
+    return target
 
 
 def _writer(format: str) -> Callable[..., dict[str, dict[str, str]]]:
