@@ -148,7 +148,7 @@ def knee(seeds: int, _: Sequence[str]) -> Iterator[Row]:
         [rms(np.array(column)) for column in zip(*runs[coloured], strict=True)] for coloured in (True, False)
     )
     words = f"{error:.5f} (claims {claim:.5f}), white design {white:.5f} (claims {of_white:.5f})"
-    # An error that lasts as long as the record: the limit stands for the mean over seeds, and holds within its interval.
+    # Slow errors last as long as the record: the limit is for the mean over seeds, and holds within its interval.
     squares = np.square([one for one, _ in runs[True]])
     least = squares.mean() - scipy.stats.t.ppf(0.975, seeds - 1) * scipy.stats.sem(squares)
     yield "steady_state", words, claim <= 0.0022 and least <= 0.0022**2 and 0.7 <= claim / error <= 1.4
