@@ -148,6 +148,7 @@ class BlockFilter:
             msg = f"belief: expected two sensors to divide the band between, got {list(sample_rate_hz)}"
             raise ValueError(msg)
         self.schedule = Schedule(sample_rate_hz)
+        self._bias = np.array([[belief[name].bias] for name in self.schedule.sensors])
         self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -204,6 +205,9 @@ class BlockFilter:
         """
         Z = self.schedule.spread(readings)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
+        # Only now: range and repetitions are those of the readings as they come.
+        if self._bias.any():
+            Z -= self._bias
         Z.flags.writeable = False
         return Z, gated
 

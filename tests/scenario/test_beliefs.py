@@ -172,6 +172,26 @@ def test_a_belief_as_written_bears_no_name_but_its_own(tmp_path):
         assert short(tmp_path, ("kalman: {}", own)).fusion["kalman"].belief["mems_gyro"].source == wanted
 
 
+def test_a_belief_in_a_file_beside_the_scenario_is_used_and_written_out(tmp_path):
+    own = "numerator: [1.0], denominator: [1.0e-3, 1.0], delay: 0.2 ms, bias: 1 deg/h, output_noise: 1 urad/s/sqrt(Hz)"
+    (tmp_path / "own.yaml").write_text(f"mems_gyro: {{{own}}}\nmhd_ars: {{{own}}}\n")
+    scenario = short(tmp_path, ("kalman: {}", "kalman: {belief: own.yaml}"))
+    belief = scenario.fusion["kalman"].belief["mems_gyro"]
+    assert (belief.delay, belief.source) == (2e-4, "own.yaml")
+    written = scenario.resolved()["fusion"]["kalman"]["belief"]
+    again = short(tmp_path, ("kalman: {}", f"kalman: {{belief: {json.dumps(written)}}}"))
+    assert again.fusion["kalman"].belief == scenario.fusion["kalman"].belief
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("none.yaml", "none.yaml"), ("../out.yaml", "expected a file in the scenario's folder")],
+)
+def test_a_belief_file_that_is_not_there_or_elsewhere_is_refused(tmp_path, name, message):
+    with pytest.raises(testbed.ScenarioError, match=message):
+        short(tmp_path, ("kalman: {}", f"kalman: {{belief: {name}}}"))
+
+
 def test_a_sensor_entry_has_no_belief_of_its_own(tmp_path):
     with pytest.raises(testbed.ScenarioError, match="belief"):
         short(tmp_path, ("{preset: sx300}", "{preset: sx300, belief: eq39}"))
