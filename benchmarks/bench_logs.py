@@ -129,10 +129,9 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--long", action="store_true", help="also a text of 1 GB")
     wanted = parser.parse_args()
-    if wanted.long:
-        # First: what `wait` reports of a child begins with the size of this process.
-        if not long_text():
-            sys.exit("a text of 1 GB needs more than 500 MB")
+    # First: what `wait` reports of a child begins with the size of this process.
+    if wanted.long and not long_text():
+        sys.exit("a text of 1 GB needs more than 500 MB")
     measure("npy", npy, column=["column 2"], unit="deg/s", time="column 1")
     measure("parquet", parquet)
     measure("hdf5", hdf5)
