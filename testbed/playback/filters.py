@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from testbed.document import Document
 from testbed.errors import Problem, ScenarioError
 from testbed.fusion.belief import SensorBelief
+from testbed.fusion.belief_file import is_belief_file, read_belief
 from testbed.inputs.plain import plain_tree
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake
@@ -22,11 +23,6 @@ if TYPE_CHECKING:
 _WHAT = "fusion (filters by name, as in a scenario)"
 # Paper 1's equation (39), as `testbed.estimate` has it.
 _DEFAULT_BELIEF = "eq39"
-
-
-def is_yaml(name: str) -> bool:
-    """Return whether a text names a file of beliefs or filters, and none of these."""
-    return Path(name).suffix.lower() in {".yaml", ".yml"}
 
 
 def filter_specs(
@@ -95,16 +91,8 @@ def _entries(document: Document) -> dict[str, Any]:
 
 def _belief(given: str | Path | Mapping[str, Any] | None) -> Any:
     """Return a belief as an entry has it: a name, or what is believed of each sensor."""
-    if given is None or (isinstance(given, str) and not is_yaml(given)):
+    if given is None or (isinstance(given, str) and not is_belief_file(given)):
         return given
     if not isinstance(given, str | Path):
         return {name: dump(one) if isinstance(one, SensorBelief) else one for name, one in given.items()}
-    document = Document(Path(given), "belief (sensors by name)")
-    held = document.data.get("belief")
-    key, found = (("belief",), held) if isinstance(held, dict) else ((), document.data)
-    read = {
-        str(name): document.validate(SensorBelief, value, (*key, name), Path(given).parent)
-        for name, value in found.items()
-    }
-    document.refuse()
-    return {name: dump(one) for name, one in read.items() if one is not None}
+    return {name: dump(one) for name, one in read_belief(Path(given)).items()}

@@ -16,9 +16,10 @@ from testbed.chain.versions import versions
 from testbed.errors import Problem, ScenarioError
 from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
+from testbed.logs.reader import is_map
 from testbed.notebook import Run, open_run
 from testbed.playback.description import description
-from testbed.playback.filters import filter_specs, is_yaml
+from testbed.playback.filters import filter_specs
 from testbed.playback.judge import ReplayJudge
 from testbed.playback.judged import finding_entry, judged
 from testbed.playback.lineup import Lineup, line_up
@@ -215,7 +216,7 @@ def _asked(
     filters: Iterable[str] | Mapping[str, Any] | str | Path,
 ) -> tuple[Iterable[str], Mapping[str, Any] | str | Path | None]:
     """Return names of filters, and filters with parameters or their file."""
-    if isinstance(filters, str) and not is_yaml(filters):
+    if isinstance(filters, str) and not is_map(filters):
         return filters.split(","), None
     if isinstance(filters, Mapping | str | Path):
         return (), filters

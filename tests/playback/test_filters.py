@@ -47,9 +47,6 @@ def test_a_belief_file_counts_for_all_filters(tmp_path):
     path.write_text(f"mhd_ars: {gyro}\nmems_gyro: {gyro}\n", encoding="utf-8")
     found = specs(["kalman"], {"wideband": {"belief": "eq39"}}, path)
     assert {tuple(one.belief["mhd_ars"].denominator) for one in found.values()} == {(0.001, 1.0)}
-    nested = tmp_path / "nested.yaml"
-    nested.write_text(f"belief:\n  mhd_ars: {gyro}\n  mems_gyro: {gyro}\n", encoding="utf-8")
-    assert specs(["kalman"], belief=nested)["kalman"].belief == found["wideband"].belief
     known = {name: testbed.belief_of("sx300") for name in SENSORS}
     assert specs(["kalman"], belief=known)["kalman"].belief["mhd_ars"].numerator == known["mhd_ars"].numerator
 
