@@ -16,6 +16,7 @@ from testbed.cli.commands import (
     parts,
     pointing,
     psd,
+    regress,
     reproduce,
     scenario,
     sweep,
@@ -41,6 +42,7 @@ app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)
 app.command()(sweep.sweep)
+app.command()(regress.regress)
 app.add_typer(compensate.app)
 app.add_typer(log.app)
 
