@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ class Outcome:
     """What came of a standard campaign.
 
     `moves` is what is no longer as in the baseline, `strangers` what has none, `standings` the leaderboard, `failures`
-    the rows of cases that failed.
+    the rows of cases that failed, `cpu_seconds` the processor time of this launch.
     """
 
     folder: Path
@@ -37,6 +38,7 @@ class Outcome:
     strangers: Sequence[str]
     standings: Sequence[Standing]
     failures: Sequence[Mapping[str, Any]]
+    cpu_seconds: float
 
 
 def run_regression(
@@ -79,6 +81,7 @@ def run_regression(
         raise ScenarioError(
             [Problem("expected no --filter: the baseline is that of the filters that ship", "--update")]
         )
+    begun = _spent()
     study = standard_study(entry or shipped(), short=short)
     target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
     _begin(target, study)
@@ -92,13 +95,20 @@ def run_regression(
     same = [row for row in before if entry is None or row["source"] in mine]
     others = [row for row in before if entry is not None and row["source"] not in mine]
     costs = {row["source"]: row["cost"] for row in others if row["cost"] is not None} | costs
-    found = Outcome(folder, moves(rows, same), strangers(rows, same), standings([*others, *rows], costs), failures)
+    order, spent = standings([*others, *rows], costs), _spent() - begun
+    found = Outcome(folder, moves(rows, same), strangers(rows, same), order, failures, spent)
     if update is not None:
         if failures:
             raise ScenarioError([Problem(f"{len(failures)} runs failed, first: {failures[0]['reason']}", "--update")])
         append(rows, costs, campaign, update, history)
     write_leaderboard(folder, study, found.standings, found.moves, read_history(history), campaign)
     return found
+
+
+def _spent() -> float:
+    """Return the processor time of this process and of those that it started and that ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _begin(folder: Path, study: Study) -> None:
