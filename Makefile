@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint docs linkcheck bench baseline crash changes readme pictures clean fuzz
+.PHONY: run view test lint docs linkcheck bench baseline crash changes commands pictures clean fuzz
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -63,9 +63,9 @@ baseline: .venv/installed-test
 crash: .venv/installed-test
 	TESTBED_CRASH_KILLS=200 TESTBED_CRASH_SIZES=20 $(BIN)/python -m pytest -s tests/crash
 
-# The table of commands in README.md.
-readme: .venv/installed-test
-	$(BIN)/python -m tests.project.readme
+# The table of commands in docs/commands.md.
+commands: .venv/installed-test
+	$(BIN)/python -m tests.project.commands
 
 # The picture of the rooms in docs/architecture.md.
 pictures: .venv/installed-test

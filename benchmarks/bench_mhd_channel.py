@@ -107,6 +107,16 @@ def speed() -> Promise:
     return Promise(f"channel of {CHANNEL.nodes} intervals over real time [-]", 1500.0, ours, at_most=False)
 
 
+def secondary_flow() -> None:
+    """Print what a step costs with the secondary flow."""
+    _, wall = sine(10.0, 1.0)
+    for nodes in (64, 160):
+        channel = CHANNEL.model_copy(update={"nodes": nodes, "flow": "similarity"})
+        channel.simulate(wall[:10], BASE_RATE_HZ)
+        spent = best_of(5, lambda channel=channel: channel.simulate(wall, BASE_RATE_HZ)) / wall.size
+        print(f"secondary flow, {nodes:3d} intervals: {1e6 * spent:.1f} us a step")
+
+
 def accuracy() -> list[Promise]:
     """Return how well the grid meets the closed form, in frequency and in time."""
     found = []
@@ -129,4 +139,5 @@ def accuracy() -> list[Promise]:
 
 
 if __name__ == "__main__":
+    secondary_flow()
     conclude(*accuracy(), speed())

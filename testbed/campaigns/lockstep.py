@@ -62,8 +62,11 @@ class Lockstep:
         }
 
     def _find_filters(self, case: Scenario, reads: Mapping[str, int]) -> dict[str, int]:
+        begin = case.frame.fusion_from
         return {
-            name: _number(self._filters, (name, spec, reads), lambda name=name: ManyFilters(case, name, self._seeds))
+            name: _number(
+                self._filters, (name, spec, reads, begin), lambda name=name: ManyFilters(case, name, self._seeds)
+            )
             for name, spec in case.fusion.items()
         }
 
@@ -85,7 +88,7 @@ class Lockstep:
             readings = [sensor.readings(pack) for _, sensor in self._sensors]
             estimates = [
                 stage.process({name: readings[i] for name, i in reads.items()}, pack)
-                for (_, _, reads), stage in self._filters
+                for (_, _, reads, _), stage in self._filters
             ]
             for i, (reads, made) in enumerate(zip(self._reads, self._estimates, strict=True)):
                 for j, seed in enumerate(pack):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from testbed.chain.instruments import start_filter, surroundings
+from testbed.chain.onset import Onset, joined, longest
 from testbed.fusion import FILTERS
 from testbed.fusion.lanes.together import Together
 from testbed.sensors import SENSORS
@@ -42,6 +43,7 @@ class ManySensors:
         self._scenario, self._name, base = scenario, name, scenario.base_rate_hz
         sensor = scenario.sensors[name]
         self._stages = {seed: sensor.start(base, seed, name) for seed in seeds}
+        self._faults = {seed: sensor.start_faults() for seed in seeds}
         self._watch = None
         if scenario.sensor_types[name] not in SENSORS:
             self._watch = {seed: CheckedSensor(name, round(base / sensor.sample_rate)) for seed in seeds}
@@ -66,7 +68,7 @@ class ManySensors:
         seeds : sequence of int
             Some of those given at the start.
         """
-        return [self._reading(seed) for seed in seeds]
+        return [self._faults[seed].process(self._reading(seed)) for seed in seeds]
 
     def _reading(self, seed: int) -> FloatArray:
         if self._split:
@@ -103,6 +105,7 @@ class ManyFilters:
             # Some design their gains before they start.
             self._stages = {seed: deepcopy(first) for seed in seeds}
             self._together = Together(first)
+            self._onsets = {seed: Onset(scenario) for seed in seeds if scenario.frame.fusion_from}
         else:
             self._stages = {seed: start_filter(scenario, name, spec) for seed in seeds}
 
@@ -119,6 +122,20 @@ class ManyFilters:
         """
         stages = [self._stages[seed] for seed in seeds]
         given = [{name: values[j] for name, values in readings.items()} for j in range(len(seeds))]
+        if self._shipped and self._onsets:
+            return self._late(stages, given, seeds)
         if self._shipped:
             return self._together.process(stages, given)
         return [stage.process(values) for stage, values in zip(stages, given, strict=True)]
+
+    def _late(
+        self, stages: Sequence[Any], given: Sequence[Mapping[str, FloatArray]], seeds: Sequence[int]
+    ) -> list[EstimateBlock]:
+        """Return the estimates where the filters do not see all readings of the run."""
+        parts = [self._onsets[seed].divide(values) for seed, values in zip(seeds, given, strict=True)]
+        unseen, seen = parts[0]
+        blank = [stages[0].blank(longest(unseen))] if longest(unseen) else []
+        if blank and not longest(seen):
+            return blank * len(seeds)
+        found = self._together.process(stages, [values for _, values in parts])
+        return [joined([*blank, one]) for one in found]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.chain.onset import LateFilter, Onset
 from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import POSE_STRIDE
 from testbed.errors import RunError
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from testbed.sensors.base import SensorStage
     from testbed.signals import FloatArray
 
+    WatchedFilter = CheckedFilter | LateFilter
+    Estimation = Callable[[Mapping[str, FloatArray]], EstimateBlock]
+
 
 class Instruments:
     """Sensors and filters of a scenario under one seed.
@@ -44,6 +48,7 @@ class Instruments:
             name: sensor.start(self.rates["base"], scenario.frame.seed, name)
             for name, sensor in scenario.sensors.items()
         }
+        self._faults = {name: sensor.start_faults() for name, sensor in scenario.sensors.items()}
         self._foreign = {
             name: CheckedSensor(name, round(self.rates["base"] / sensor.sample_rate))
             for name, sensor in scenario.sensors.items()
@@ -54,11 +59,11 @@ class Instruments:
 
     def process(self, command: CommandBlock, truth: TruthBlock) -> RunBlock:
         """Return all that the run has over a block of the truth."""
-        return self._block(command, truth, CheckedFilter.process)
+        return self._block(command, truth, lambda stage: stage.process)
 
     def tried(self, command: CommandBlock, truth: TruthBlock) -> RunBlock:
         """Return the same of a trial, in which shipped filters stay undefined (`CheckedFilter.tried`)."""
-        return self._block(command, truth, CheckedFilter.tried)
+        return self._block(command, truth, lambda stage: stage.tried)
 
     @property
     def untried_seconds(self) -> float:
@@ -66,15 +71,13 @@ class Instruments:
         steps = {name: self.rates[name] / self.rates["base"] for name in self._fusion}
         return sum(steps[name] * stage.untried_seconds for name, stage in self._fusion.items())
 
-    def _block(
-        self, command: CommandBlock, truth: TruthBlock, estimated: Callable[[CheckedFilter, Any], EstimateBlock]
-    ) -> RunBlock:
+    def _block(self, command: CommandBlock, truth: TruthBlock, way: Callable[[WatchedFilter], Estimation]) -> RunBlock:
         readings, profiles = {}, {}
         for name in self._sensors:
             readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: estimated(stage, readings) for name, stage in self._fusion.items()}
+        estimates = {name: way(stage)(readings) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         rates = {name: estimate.rate for name, estimate in estimates.items()}
         return RunBlock(
@@ -97,7 +100,8 @@ class Instruments:
             return _sense(stage, rate, truth.start, around)
 
         rate = truth.sensor_rate[name]
-        return self._foreign[name].sense(feed, rate) if name in self._foreign else feed(rate)
+        readings, profile = self._foreign[name].sense(feed, rate) if name in self._foreign else feed(rate)
+        return self._faults[name].process(readings), profile
 
 
 def sample_rates(scenario: Scenario) -> dict[str, float]:
@@ -129,8 +133,8 @@ def surroundings(scenario: Scenario, name: str, truth: TruthBlock) -> Surroundin
     return Surroundings(truth.cross_rate.get(name), truth.specific_force.get(name), temperature)
 
 
-def start_filter(scenario: Scenario, name: str, spec: FilterSpec) -> CheckedFilter:
-    """Return a filter of a scenario at its beginning, under watch.
+def start_filter(scenario: Scenario, name: str, spec: FilterSpec) -> WatchedFilter:
+    """Return a filter of a scenario at its beginning, under watch; it sees the readings from `fusion_from` on.
 
     Parameters
     ----------
@@ -148,7 +152,11 @@ def start_filter(scenario: Scenario, name: str, spec: FilterSpec) -> CheckedFilt
     """
     rates = {sensor: part.sample_rate for sensor, part in scenario.sensors.items()}
     fastest = sample_rates(scenario)[name]
-    return CheckedFilter(name, _started(name, spec, rates), fastest, shipped=spec.type in FILTERS)
+
+    def started() -> CheckedFilter:
+        return CheckedFilter(name, _started(name, spec, rates), fastest, shipped=spec.type in FILTERS)
+
+    return LateFilter(started(), started(), Onset(scenario)) if scenario.frame.fusion_from else started()
 
 
 def _started(name: str, spec: FilterSpec, rates: Mapping[str, float]) -> Any:

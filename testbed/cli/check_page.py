@@ -56,7 +56,7 @@ def warnings(scenario: Scenario) -> list[str]:
     if seen < whole:
         base = scenario.base_rate_hz
         shown = f"{seen / base:.3g} s in windows spread over {whole / base:g} s"
-        windows = [f"motion: peaks of rate and torque are those of {shown}"]
+        windows = [f"motion: peaks of rate and torque and the stroke are those of {shown}"]
     return [*doubts(scenario), *windows]
 
 
@@ -76,8 +76,9 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
     console.print(f"{scenario.name}: {scenario.file}", soft_wrap=True)
     if frame.description:
         console.print(frame.description, soft_wrap=True)
+    begin = f"filters from {frame.fusion_from:g} s on, " if frame.fusion_from else ""
     console.print(
-        f"{frame.duration:g} s at {scenario.base_rate_hz:g} Hz, metrics from {frame.settle:g} s on, "
+        f"{frame.duration:g} s at {scenario.base_rate_hz:g} Hz, {begin}metrics from {frame.settle:g} s on, "
         f"seed {frame.seed}: {size_words(size)}",
         soft_wrap=True,
     )

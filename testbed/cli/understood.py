@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from testbed.cli.console import ruled, terminal
 from testbed.cli.terminal import step_words
 from testbed.runs.table import rate_text
+from testbed.scenario.peaks import command_peaks
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,8 +42,15 @@ def translations(scenario: Scenario) -> dict[str, list[Step]]:
 
 
 def doubts(scenario: Scenario) -> list[str]:
-    """Return what does not fit together in the sensors, by name."""
-    return [f"{name}: {doubt}" for name, sensor in scenario.sensors.items() for doubt in sensor.doubts()]
+    """Return what does not fit together in the sensors, or between them and the motion, by name."""
+    found = [f"{name}: {doubt}" for name, sensor in scenario.sensors.items() for doubt in sensor.doubts()]
+    peaks = command_peaks(scenario)
+    moved = [
+        f"{name}: {doubt}"
+        for name, sensor in scenario.sensors.items()
+        for doubt in sensor.beyond(peaks.rate, peaks.stroke)
+    ]
+    return [*found, *moved]
 
 
 def scenario_document(scenario: Scenario, facts: TableFacts) -> dict[str, Any]:

@@ -26,6 +26,8 @@ FILTERS = {
     "blending": "testbed.fusion.filters.blending:Blending",
     "wideband": "testbed.fusion.filters.wideband:Wideband",
     "allan_srkf": "testbed.fusion.filters.allan_srkf:AllanSrkf",
+    "vb_akf": "testbed.fusion.filters.vb_akf:VbAkf",
+    "imm": "testbed.fusion.filters.imm:Imm",
 }
 
 

@@ -184,6 +184,7 @@ class BlockFilter:
         self.schedule = Schedule(sample_rate_hz, any_ratio=True)
         self._stamps: Stamps | None = None if self.schedule.even else Stamps(sample_rate_hz)
         self._pending: FloatArray | None = None
+        self._bias = np.array([[belief[name].bias] for name in self.schedule.sensors])
         self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -253,6 +254,9 @@ class BlockFilter:
         """
         Z, timing = self._spread(readings, time_ns)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
+        # Only now: range and repetitions are those of the readings as they come.
+        if self._bias.any():
+            Z -= self._bias
         Z.flags.writeable = False
         return Received(Z, gated, timing)
 

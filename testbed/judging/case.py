@@ -142,7 +142,8 @@ class CaseFacts:
         start: StartKind = getattr(self.scenario.fusion[name].parameters, "start", "rest")
         if (lines, start) not in self._optima:
             frame = self.scenario.frame
-            best, _ = self._bounds.of_run([lines, *([line] for line in lines)], start, (frame.settle, frame.duration))
+            window = (frame.settle - frame.fusion_from, frame.duration - frame.fusion_from)
+            best, _ = self._bounds.of_run([lines, *([line] for line in lines)], start, window)
             self._optima[lines, start] = None if best is None else [in_deg(one.rmse) for one in best]
         found = self._optima[lines, start]
         if found is None:

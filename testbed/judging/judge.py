@@ -152,4 +152,6 @@ class Judge:
 def _gated(diagnostics: Mapping[str, Any]) -> dict[str, int]:
     """Return how many readings of each sensor the front part of a filter has struck out so far."""
     stem = "gated_"
-    return {key[len(stem) :]: int(n[-1]) for key, n in diagnostics.items() if key.startswith(stem) and n.size}
+    counts = {key[len(stem) :]: n[-1] for key, n in diagnostics.items() if key.startswith(stem) and n.size}
+    # A filter of a plug-in that is not switched on yet has counted nothing.
+    return {sensor: int(n) for sensor, n in counts.items() if np.isfinite(n)}

@@ -30,7 +30,7 @@ _GYRO = re.compile(r"gyr|rate|omega|\bw\b|^[grw]_?[xyz]$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Finding:
+class Oddity:
     """Something that is wrong or odd.
 
     Parameters
@@ -58,14 +58,14 @@ class Report:
         Its numbers, in the unit of the file.
     clock : TimeBase, optional
         Its time base, where there are stamps.
-    findings : tuple of Finding
+    findings : tuple of Oddity
         What is wrong or odd.
     """
 
     plan: Plan
     values: Values
     clock: TimeBase | None
-    findings: tuple[Finding, ...]
+    findings: tuple[Oddity, ...]
 
 
 def inspect(plans: Sequence[Plan]) -> list[Report]:
@@ -133,7 +133,7 @@ class _ChannelScan:
         return None if self._clock is None else self._clock.result()
 
 
-def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: Plan) -> Iterator[Finding]:
+def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: Plan) -> Iterator[Oddity]:
     """Yield what is wrong or odd with a channel.
 
     Parameters
@@ -147,30 +147,28 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
     one : Plan
         How it is read.
     """
-    yield from (Finding("unit", text) for text in one.contradictions)
+    yield from (Oddity("unit", text) for text in one.contradictions)
     if clock is not None:
         yield from _of_time(table, clock)
         nominal = one.rate_hz or one.nominal_hz
         if nominal is not None and clock.even and not clock.agrees_with(nominal):
-            yield Finding("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
+            yield Oddity("rate", f"the nominal rate {nominal:g} Hz contradicts the stamps: {clock.said()}")
     if values.n_missing:
-        yield Finding("missing", f"{values.n_missing} values are missing in {one.label}")
+        yield Oddity("missing", f"{values.n_missing} values are missing in {one.label}")
     if not _turns(one):
         return
     if values.repeats > 1.0:
-        yield Finding("repeats", _repeats_text(values, one.label))
+        yield Oddity("repeats", _repeats_text(values, one.label))
     if values.stray is not None:
-        yield Finding("stray", _stray_text(values.stray, one.label))
+        yield Oddity("stray", _stray_text(values.stray, one.label))
     limit = None if one.largest is None else one.largest / abs(one.factor)
     if values.saturated or (limit is not None and max(-values.low, values.high) >= 0.999 * limit):
         ends = f"{values.at_low} samples at {values.low:g}, {values.at_high} at {values.high:g}"
-        yield Finding(
+        yield Oddity(
             "saturation", f"{one.label} is out of range: {ends}, up to {max(values.row_low, values.row_high)} in a row"
         )
     if values.rounded:
-        yield Finding(
-            "rounding", f"{one.label} is rounding: words of {values.word:.4g}, noise of less than half a word"
-        )
+        yield Oddity("rounding", f"{one.label} is rounding: words of {values.word:.4g}, noise of less than half a word")
 
 
 def _repeats_text(values: Values, label: str) -> str:
@@ -192,24 +190,22 @@ def _turns(one: Plan) -> bool:
     return one.quantity in ROTATIONS or (not one.quantity and _GYRO.search(one.name) is not None)
 
 
-def _of_time(table: Table, clock: TimeBase) -> Iterator[Finding]:
+def _of_time(table: Table, clock: TimeBase) -> Iterator[Oddity]:
     if clock.coarse:
         rounded = f"the stamps are rounded to {NANO * clock.quantum_ns:g} s, coarser than the samples"
-        yield Finding("coarse", f"{rounded}; --rate '{clock.mean_rate_hz:.6g} Hz' takes them as even")
+        yield Oddity("coarse", f"{rounded}; --rate '{clock.mean_rate_hz:.6g} Hz' takes them as even")
         return
     if clock.gaps.count:
-        yield Finding("gaps", gap_text(table, clock))
+        yield Oddity("gaps", gap_text(table, clock))
     for kind, tally, what in (
         ("doubled", clock.doubled, "stamps stand twice"),
         ("backward", clock.backward, "stamps go back"),
         ("uneven", clock.uneven, "steps are no multiple of the usual one"),
     ):
         if tally.count:
-            yield Finding(kind, f"{tally.count} {what}: {_places(table, tally)}")
+            yield Oddity(kind, f"{tally.count} {what}: {_places(table, tally)}")
     if clock.wraps:
-        yield Finding(
-            "wraps", f"the counter of the stamps began anew {clock.wraps} times, which was taken into account"
-        )
+        yield Oddity("wraps", f"the counter of the stamps began anew {clock.wraps} times, which was taken into account")
 
 
 def gap_text(table: Table, clock: TimeBase) -> str:

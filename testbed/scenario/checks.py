@@ -17,6 +17,7 @@ from testbed.scenario.model import METRICS
 from testbed.scenario.peaks import command_peaks
 from testbed.scenario.pointing import check_pointing, known_pointing_metrics
 from testbed.scenario.step_choice import excerpt, exposed, given_step
+from testbed.scenario.times import check_times
 from testbed.sensors import SENSORS
 from testbed.sensors.checked import try_sensor
 
@@ -35,7 +36,7 @@ def cross_check(scenario: Scenario, document: Document) -> None:
     _check_sizes(scenario, document)
     if document.problems:
         return
-    _check_times(scenario, document)
+    check_times(scenario, document)
     _check_clocks(scenario, document)
     check_pointing(scenario, document)
     _check_expectations(scenario, document)
@@ -60,26 +61,6 @@ def _check_sizes(scenario: Scenario, document: Document) -> None:
             grid((band.low, band.high), duration)
         except ScenarioError as error:
             document.find(("turntable", "floor", "bands", i), _reasons(error))
-
-
-def _check_times(scenario: Scenario, document: Document) -> None:
-    frame = scenario.frame
-    if frame.settle >= frame.duration:
-        document.find(
-            ("settle",),
-            f"expected less than the duration {frame.duration:g} s, got {frame.settle:g} s: "
-            "no time is left for the metrics",
-        )
-    base = scenario.base_rate_hz
-    if scenario.n_time < 1 or abs(scenario.n_time / base - frame.duration) > 1e-9 * frame.duration:
-        document.find(
-            ("duration",), f"expected a multiple of the base step {1e6 / base:g} us, got {frame.duration!r} s"
-        )
-    if frame.detail is not None and not frame.detail[0] < frame.detail[1] <= frame.duration:
-        document.find(
-            ("detail",),
-            f"expected a start before the end, within the run, got {frame.detail[0]:g} s ... {frame.detail[1]:g} s",
-        )
 
 
 def _check_clocks(scenario: Scenario, document: Document) -> None:

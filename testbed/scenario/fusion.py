@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import UnknownNameError, quoted
+from testbed.errors import ScenarioError, UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.fusion.belief_file import is_belief_file, read_belief
+from testbed.inputs.files import beside_scenario
 from testbed.scenario.beliefs import EXACT, exact_belief
 from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.intake import unresolved
@@ -38,6 +41,8 @@ class Fusion:
         What the presets of the sensors say of them.
     turntable : TurntableParameters or None
         What carries them, which rests at t = 0.
+    at_rest : bool
+        Whether the filters see that: their first readings are those of t = 0.
     """
 
     intake: Intake
@@ -45,6 +50,7 @@ class Fusion:
     types: Mapping[str, str]
     data_sheets: Mapping[str, SensorBelief | None]
     turntable: TurntableParameters | None
+    at_rest: bool
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
@@ -88,7 +94,8 @@ class Fusion:
         """Return what a filter may know of a scenario's table, unless its entry says otherwise: it rests at t = 0, at
         the Earth's rate where that is on.
         """
-        if "start" not in getattr(model, "model_fields", {}) or entry.get("start", "rest") != "rest":
+        told = entry.get("start", "rest" if self.at_rest else "unknown")
+        if "start" not in getattr(model, "model_fields", {}) or told != "rest":
             return {}
         earth = None if self.turntable is None else self.turntable.earth_rate
         return {"start": "rest"} | ({} if earth is None else {"rest_rate": f"{earth.vector[2]!r} rad/s"})
@@ -138,6 +145,8 @@ class Fusion:
 
     def _named(self, written: Any, key: Key) -> Mapping[str, SensorBelief] | None:
         """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
+        if isinstance(written, str) and is_belief_file(written):
+            return self._of_file(written, key)
         if isinstance(written, str):
             try:
                 return load_belief(written)
@@ -145,18 +154,35 @@ class Fusion:
                 self._find(key, str(error))
                 return None
         if not isinstance(written, dict):
-            self._find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
+            wanted = "the name of a belief, a file of one, or a mapping of sensors"
+            self._find(key, f"expected {wanted}, got {quoted(written)}")
             return None
         read = {str(name): self.intake.validate(SensorBelief, value, (*key, name)) for name, value in written.items()}
         known = {name: _labelled(one) for name, one in read.items() if one is not None}
         return known if len(known) == len(read) else None
 
+    def _of_file(self, written: str, key: Key) -> Mapping[str, SensorBelief] | None:
+        """Return a belief that stands in a file beside the scenario; None if it cannot be used, with the reason
+        noted.
+        """
+        context = {"folder": self.intake.folder, "allow_outside": self.intake.allow_outside}
+        try:
+            return read_belief(beside_scenario(Path(written), context))
+        except ScenarioError as error:
+            self.intake.document.adopt(error)
+        except ValueError as error:
+            self._find(key, str(error))
+        return None
+
 
 def _labelled(one: SensorBelief) -> SensorBelief:
     """Return a belief as written out, which bears the name of a shipped one only if it is that.
 
-    Where the noise of the sensor is off, the scenario itself has taken its resolution away.
+    Where the noise of the sensor is off, the scenario itself has taken its resolution away. The name of a file is that
+    of no shipped one, and what it held stands here.
     """
+    if is_belief_file(one.source):
+        return one
     try:
         known = load_belief(one.source).values()
     except ValueError:

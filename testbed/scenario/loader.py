@@ -171,7 +171,8 @@ class _Reader:
         sensors, types = self._sensors(parts["sensors"])
         if frame is not None and "temperature" in frame.model_fields_set:
             sensors = {name: at_temperature(sensor, frame.temperature.start) for name, sensor in sensors.items()}
-        fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable).read(parts["fusion"])
+        at_rest = frame is None or not frame.fusion_from
+        fusion = Fusion(self._intake, sensors, types, self._data_sheets, turntable, at_rest).read(parts["fusion"])
         pointing = self._pointing(parts["pointing"])
         expect = self._expect(parts["expect"])
         if frame is None or turntable is None or self._doc.problems:

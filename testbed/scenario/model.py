@@ -60,8 +60,11 @@ class Frame(Part):
         the sensors alone.
     duration : float
         Length of the run [s].
+    fusion_from : float, optional
+        The filters see the readings from here on [s], a time at which every sensor has one; then they do not know that
+        the table has been at rest, unless an entry says ``start: rest``.
     settle : float, optional
-        Metrics start here [s].
+        Metrics start here [s]; with the filters if not given.
     ramp_in : float, optional
         Smooth ramp-in of the motion [s].
     temperature : TemperatureProfile, optional
@@ -80,7 +83,8 @@ class Frame(Part):
     seed: Seed = 0
     truth_seed: Seed | None = None
     duration: PositiveDuration
-    settle: Duration = 0.0
+    fusion_from: Duration = 0.0
+    settle: Duration = Field(default_factory=lambda given: float(given.get("fusion_from", 0.0)))
     ramp_in: Duration = 0.5
     temperature: TemperatureProfile = ROOM
     bandwidth: Frequency = 1000.0

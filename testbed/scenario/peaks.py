@@ -35,11 +35,14 @@ class Peaks:
         Largest torque that it asks of the motor [N m].
     places : tuple of 3 int
         Base steps of the largest rate, torque and third derivative of the rate.
+    stroke : float
+        Half of the angle between the extreme positions, in windows that do not follow one another of the widest [rad].
     """
 
     rate: float
     torque: float
     places: tuple[int, int, int]
+    stroke: float
 
 
 def command_peaks(scenario: Scenario) -> Peaks:
@@ -58,16 +61,22 @@ def command_peaks(scenario: Scenario) -> Peaks:
         If the motion of a plug-in fails.
     """
     motion, peaks, places = scenario.profile(), [0.0, -1.0, -1.0], [0, 0, 0]
+    stroke, end, angle, extremes = 0.0, 0, 0.0, (0.0, 0.0)
     for start, n_time in windows(scenario.n_time, _cost(scenario)):
         command = motion.peek(n_time, start)
         if not (np.isfinite(command.rate).all() and np.isfinite(command.rate_mid).all()):
             msg = f"expected a finite rate, got one that is not, from t = {start / scenario.base_rate_hz:g} s on"
             raise ScenarioError(msg)
+        if start != end:
+            angle, extremes = 0.0, (0.0, 0.0)
+        extremes = min(extremes[0], angle + command.angle.min()), max(extremes[1], angle + command.angle.max())
+        end, angle = start + n_time, angle + command.angle[-1]
+        stroke = max(stroke, 0.5 * float(extremes[1] - extremes[0]))
         torque = required_torque(scenario.turntable, command, scenario.base_rate_hz)
         for i, measure in enumerate((np.abs(command.rate), torque, np.abs(np.diff(command.rate, n=3)))):
             if measure.size and float(np.max(measure)) > peaks[i]:
                 peaks[i], places[i] = float(np.max(measure)), start + int(np.argmax(measure))
-    return Peaks(peaks[0], max(peaks[1], 0.0), (places[0], places[1], places[2]))
+    return Peaks(peaks[0], max(peaks[1], 0.0), (places[0], places[1], places[2]), stroke)
 
 
 def played(scenario: Scenario) -> int:

@@ -13,12 +13,14 @@ from pydantic import (
     ModelWrapValidatorHandler,
     ValidationError,
     ValidationInfo,
+    field_validator,
     model_validator,
 )
 
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.sensors.data_sheet import Sheet, Word
+from testbed.sensors.faults import Fault, FaultStage, first_overlap
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import SampleRate
 
@@ -119,6 +121,8 @@ class Sensor(Part):
         range stay.
     mounting : Mounting
         Where it sits on the table and how far its axis is off.
+    faults : tuple of Fault
+        Spans in which the readings are none, behind everything else, such as ``[{kind: stuck, at: 5 s, length: 1 s}]``.
 
     Attributes
     ----------
@@ -131,6 +135,17 @@ class Sensor(Part):
     sample_rate: SampleRate
     noise: bool = True
     mounting: Mounting = Mounting()
+    faults: tuple[Fault, ...] = ()
+
+    @field_validator("faults")
+    @classmethod
+    def _one_at_a_time(cls, faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
+        if pair := first_overlap(faults):
+            one, other = pair
+            msg = f"expected one fault at a time, got {other.kind} at {other.at:g} s before the end of {one.kind} at "
+            msg += f"{one.end:g} s"
+            raise ValueError(msg)
+        return faults
 
     @classmethod
     def sheet(cls, values: Mapping[str, Any], *, border: bool) -> Sheet:
@@ -203,6 +218,16 @@ class Sensor(Part):
         """Return what does not fit together although each value may be right, for people to read."""
         return []
 
+    def beyond(self, rate: float, stroke: float) -> list[str]:
+        """Return where a motion leaves what the model of the instrument holds for, for people to read.
+
+        Parameters
+        ----------
+        rate, stroke : float
+            Its largest rate [rad/s], and half of the angle between its extreme positions [rad].
+        """
+        return []
+
     @abstractmethod
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
         """Return indicated over true rate, noise-free, in continuous time.
@@ -217,6 +242,10 @@ class Sensor(Part):
         ndarray of complex, shape (n_freq,)
             Response [-].
         """
+
+    def start_faults(self) -> FaultStage:
+        """Return the stage behind that of `start`: what becomes of its readings."""
+        return FaultStage(self.faults, self.sample_rate, self.full_scale())
 
     @property
     def exposed(self) -> bool:
@@ -254,7 +283,7 @@ class Sensor(Part):
     @abstractmethod
     def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
         """Return the instrument as it has stood for long under the rate that is on at its first sample, its noise
-        stationary.
+        stationary; its faults are a stage of their own (`start_faults`).
 
         Parameters
         ----------
@@ -302,7 +331,7 @@ class Sensor(Part):
         if record.ndim != 1:
             msg = f"rate: expected shape (n_time,), got {record.shape}"
             raise ValueError(msg)
-        return self.start(input_rate_hz, seed, "sensor").process(record)
+        return self.start_faults().process(self.start(input_rate_hz, seed, "sensor").process(record))
 
 
 def rate_ratio(input_rate_hz: float, sample_rate_hz: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from testbed.models.mhd_channel.channel import MhdChannel
+from testbed.models.mhd_channel.linear_range import linear_range
 from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
@@ -130,6 +131,13 @@ class MhdArs(Sensor, ElectronicTerms):
             density += self.johnson_noise**2 / np.abs(self.warm_channel.response(freq_hz)) ** 2
         return density
 
+    def beyond(self, rate: float, stroke: float) -> list[str]:
+        """Return where a motion drives a secondary flow that a linear channel leaves out; see `Sensor.beyond`."""
+        numbers = linear_range(self.warm_channel, rate, stroke)
+        if self.channel.flow != "linear" or numbers.holds:
+            return []
+        return [f"channel: the motion leaves the range of 'flow: linear': {numbers.words()}; take 'flow: similarity'"]
+
     def response(self, freq_hz: ArrayLike) -> ComplexArray:
         """Return indicated over true rate: channel (Su et al. 2024, equation (2)) and electronics, rails aside.
 
@@ -198,8 +206,9 @@ class MhdArsStage:
         """Return what it would read without noise and word [rad/s]; see `SplitStage`."""
         if true_rate.size and np.isnan(self._first):
             self._first = float(true_rate[0])
-        # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
-        signal = self._gain * self._channel.process(true_rate - self._first)
+            # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
+            self._channel.begin(self._first)
+        signal = self._gain * self._channel.process(true_rate)
         for stage in self._before:
             signal = stage.process(signal)
         if self._early:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+import pytest
+
 from testbed.chain.forecast import forecast
 from testbed.cli.check_page import print_page, size_words, warnings
 from testbed.judging.table_facts import table_facts
@@ -33,3 +36,18 @@ def test_a_motion_that_is_seen_in_windows_is_told(tmp_path):
     hour = short(tmp_path, ("duration: 0.5 s", "duration: 1 h"))
     (told,) = warnings(hour)
     assert "in windows spread over 3600 s" in told
+
+
+def test_a_motion_beyond_the_linear_channel_is_told_by_numbers(tmp_path):
+    slow = ("frequency: 10 Hz, rate: 1 deg/s", "frequency: 0.5 Hz, rate: 25 deg/s")
+    weak = ("{preset: sx300}", "{preset: sx300, channel: {height: 10 mm, field: 0.036 T}}")
+    length = ("duration: 0.5 s", "duration: 2 s")
+    assert warnings(short(tmp_path, slow, length)) == []
+    (told,) = warnings(short(tmp_path, slow, length, weak))
+    stroke = re.match(r"mhd_ars: channel: the motion leaves the range of 'flow: linear': stroke ([\d.]+) deg", told)
+    # 25 deg/s over w; the motion's beginning is smooth. Then a/W of 0.0996 1/s, and nu/(W l^2).
+    assert stroke is not None
+    assert float(stroke[1]) == pytest.approx(25.0 / np.pi, rel=0.02)
+    assert "Elsasser number 0.23 (at least 10) or Ekman number 0.0026 (at least 1)" in told
+    whole = ("field: 0.036 T", "field: 0.036 T, flow: similarity")
+    assert warnings(short(tmp_path, slow, length, weak, whole)) == []

@@ -169,6 +169,7 @@ VALUES = {
     "sample_rate": 500.0,
     "dead_band": 0.005,
     "dropped": 0.2,
+    "faults": [{"kind": "rail", "at": 0.0, "length": 1.0}],
     # A second moves the core of a fibre-optic gyro by millikelvins: no half-width but zero is left.
     "thermal.half_width": (0.0, 0.0),
     "thermometer.lag": 1e-3,
@@ -233,6 +234,7 @@ def output(sensor):
     around = Surroundings(np.outer(rate, [1, -2]), np.outer(1 + rate, [1, 2, 3]), 310.0 + 100 * rate)
     stage = sensor.start(FS, 1, "sensor")
     readings = stage.process_in(rate, around) if isinstance(stage, ExposedStage) else stage.process(rate)
+    readings = sensor.start_faults().process(readings)
     temperature = stage.temperature if isinstance(stage, ThermalStage) else np.empty(0)
     return readings, temperature, sensor.response(np.array([1.0, 100.0]))
 

@@ -95,6 +95,7 @@ def test_design_refuses_what_makes_no_sense(choice: list[str], capsys: pytest.Ca
     ("name", "options"),
     [
         ("one_mode_error", []),
+        ("linear_range", []),
         ("design_channel", ["--fluid", "galinstan", "--closure", "radial_field", "--load-fraction", "0.5", "--figure"]),
     ],
 )

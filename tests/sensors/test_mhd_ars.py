@@ -126,6 +126,16 @@ def test_stage_shows_the_velocity_profile() -> None:
     assert np.abs(stage.profile()).max() > 1e-3
 
 
+def test_secondary_flow_takes_the_rate_as_it_is_and_the_linear_one_its_changes() -> None:
+    """A sensor that has turned for long starts in equilibrium; how fast matters to the secondary flow alone."""
+    swing = np.sin(2 * np.pi * np.arange(40_000) / 40_000.0)
+    for flow, alike in (("linear", True), ("similarity", False)):
+        channel = sx300().channel.model_copy(update={"field": 0.036, "nodes": 32, "flow": flow})
+        sensor = sx300().model_copy(update={"channel": channel, "noise": False})
+        still, turning = (sensor.sample(offset + swing, 20e3) for offset in (0.0, 2.0))
+        assert (np.abs(turning - still).max() < 1e-9) == alike
+
+
 def test_input_noise_is_the_output_noise_over_the_response() -> None:
     sensor = sx300()
     freq = np.array([0.01, 1.0, 100.0])
@@ -138,7 +148,7 @@ def test_input_noise_is_the_output_noise_over_the_response() -> None:
 
 
 def test_every_parameter_is_among_the_options() -> None:
-    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting"}
+    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting", "faults"}
 
 
 @pytest.mark.parametrize("key", OPTIONS)

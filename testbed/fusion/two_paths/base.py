@@ -34,8 +34,9 @@ from testbed.units import Frequency, Range
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from testbed.fusion.belief import Realisation, SensorBelief
+    from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
+    from testbed.fusion.realisation import Realisation
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
@@ -108,6 +109,7 @@ class TwoPaths(BlockFilter):
         super().__init__(belief, sample_rate_hz, parameters)
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self.model.check_cycle()
+        _refuse_delay({name: belief[name] for name in self.model.sensors})
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
@@ -213,6 +215,13 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     return slow, fast
 
 
+def _refuse_delay(belief: Mapping[str, SensorBelief]) -> None:
+    late = [name for name, one in belief.items() if one.delay > 0.0]
+    if late:
+        msg = f"belief: expected sensors without a delay, got {late}: no inverse makes up for one; `kalman` takes it"
+        raise ValueError(msg)
+
+
 def _as_they_come(slow: SensorBelief, freq_hz: float, sample_rate_hz: float) -> complex:
     """Return readings over a sine, held for their interval: half of it late [-]."""
     return complex(slow.realisation().response(np.array([freq_hz]))[0]) * cmath.exp(
@@ -266,7 +275,7 @@ def _best_alone(
     """
 
     def band_of(bandwidth_hz: float) -> tuple[FloatArray, FloatArray]:
-        excess = slow.n_pole - np.trim_zeros(np.array(slow.numerator), "f").size + 1
+        excess = slow.n_state - np.trim_zeros(np.array(slow.numerator), "f").size + 1
         return low_pass(BAND_ORDER, 2.0 * math.pi * bandwidth_hz, BAND_ORDER + excess + 1)
 
     def error(log_f: float) -> float:

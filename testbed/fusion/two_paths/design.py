@@ -24,7 +24,7 @@ from testbed.fusion.belief import SensorBelief
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from testbed.fusion.belief import Realisation
+    from testbed.fusion.realisation import Realisation
     from testbed.signals import FloatArray
 
 # Order of the band end: the rate through three integrators, as in the optimum of most signals.

@@ -25,6 +25,7 @@ from pydantic import Field, field_validator
 from testbed.models.mhd_channel.chebyshev import chebyshev_points
 from testbed.models.mhd_channel.fluids import NamedFluid
 from testbed.models.mhd_channel.modes import ChannelModes, ChannelStage, channel_modes
+from testbed.models.mhd_channel.similarity import SimilarityStage, radial_basis
 from testbed.models.mhd_channel.thermal_drift import drift
 from testbed.parts import Part
 from testbed.units import Length, MagneticField, RatioPerKelvin
@@ -47,7 +48,8 @@ class MhdChannel(Part):
     .. math:: H = \frac{s F}{s + \delta + \kappa F}, \; F = 1 - \frac{\tanh z}{z},
         \; z = \frac{l}{2}\sqrt{(s + \delta)/\nu}
 
-    Linear: the secondary flow that large, slow swings drive is outside of it.
+    That is the `linear` flow. Large, slow swings drive a secondary flow, which `similarity` adds
+    (`testbed.models.mhd_channel.similarity`); its response to small ones is the same.
 
     Parameters
     ----------
@@ -65,6 +67,8 @@ class MhdChannel(Part):
         beta, 0 to 1 [-]; only 1 with `local`.
     nodes : int
         Chebyshev intervals of the grid over h, even, 8 to 512 [-].
+    flow : {"linear", "similarity"}
+        Without or with the secondary flow.
 
     References
     ----------
@@ -84,6 +88,7 @@ class MhdChannel(Part):
     closure: Literal["local", "radial_field", "axial_field"] = "local"
     load_fraction: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     nodes: Annotated[int, Field(strict=True)] = 160
+    flow: Literal["linear", "similarity"] = "linear"
 
     @field_validator("load_fraction")
     @classmethod
@@ -110,6 +115,11 @@ class MhdChannel(Part):
     def braking_rate(self) -> float:
         """Lorentz braking rate a = sigma B^2/rho [1/s]."""
         return self.fluid.conductivity * self.field**2 / self.fluid.density
+
+    @property
+    def radial_braking_rate(self) -> float:
+        """Braking rate b of radial flow [1/s]: a where the field is axial and so crosses it, else 0."""
+        return self.braking_rate if self.closure == "axial_field" else 0.0
 
     @property
     def hartmann_number(self) -> float:
@@ -186,7 +196,11 @@ class MhdChannel(Part):
 
     def start(self, sample_rate_hz: float) -> ChannelStage:
         """Return the channel in time, at rest, for samples at `sample_rate_hz` [Hz] that arrive block by block."""
-        return ChannelStage(self._modes(), sample_rate_hz)
+        if self.flow == "linear":
+            return ChannelStage(self._modes(), sample_rate_hz)
+        return SimilarityStage(
+            self._modes(), sample_rate_hz, radial_basis(self.nodes, self._diffusion(), self.radial_braking_rate)
+        )
 
     def simulate(self, wall_rate: FloatArray, sample_rate_hz: float) -> FloatArray:
         """Solve the fluid equation in time from rest.
@@ -194,7 +208,7 @@ class MhdChannel(Part):
         Parameters
         ----------
         wall_rate : ndarray, shape (n_time,)
-            Wall velocity or rate, any unit; linear between samples.
+            Wall velocity or rate, any unit, rad/s with the flow `similarity`; linear between samples.
         sample_rate_hz : float
             Rate of the samples [Hz].
 
@@ -216,7 +230,11 @@ class MhdChannel(Part):
         return {"local": (a, 0.0), "radial_field": (0.0, beta * a), "axial_field": (a, -(1.0 - beta) * a)}[self.closure]
 
     def _modes(self) -> ChannelModes:
-        return channel_modes(self.nodes, self.fluid.kinematic_viscosity / self.height**2, *self._braking())
+        return channel_modes(self.nodes, self._diffusion(), *self._braking())
+
+    def _diffusion(self) -> float:
+        """Return nu/l^2 [1/s]."""
+        return self.fluid.kinematic_viscosity / self.height**2
 
 
 def one_mode_response(channel: MhdChannel, freq_hz: ArrayLike) -> ComplexArray:

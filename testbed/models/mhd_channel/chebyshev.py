@@ -1,7 +1,7 @@
-"""Wall-clustered spectral grid on [0, 1]: Chebyshev-Gauss-Lobatto points, second derivative, Clenshaw-Curtis mean.
+"""Wall-clustered spectral grid on [0, 1]: Chebyshev-Gauss-Lobatto points, derivatives, Clenshaw-Curtis mean.
 
 Points and weights are those of n intervals, n even. Flow that is even about the centre needs half of them only:
-see `even_operators`.
+see `even_operators` and `even_transport`.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def chebyshev_points(intervals: int) -> FloatArray:
     return points
 
 
-def second_derivative(intervals: int) -> FloatArray:
-    """Return the matrix that differentiates the interpolating polynomial twice.
+def derivatives(intervals: int) -> tuple[FloatArray, FloatArray]:
+    """Return the matrices that differentiate the interpolating polynomial once and twice.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def second_derivative(intervals: int) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (intervals + 1, intervals + 1)
-        Second derivative at the points from the values at the points [-].
+    first, second : ndarray, shape (intervals + 1, intervals + 1)
+        Derivatives at the points from the values at the points [-].
 
     References
     ----------
@@ -56,12 +56,14 @@ def second_derivative(intervals: int) -> FloatArray:
     weight[[0, -1]] *= 2.0
     ratio = weight[:, None] / weight[None, :]
     derivative: FloatArray = np.eye(intervals + 1)
+    found = []
     for order in (1, 2):
         derivative = order * inverse * (ratio * np.diag(derivative)[:, None] - derivative)
         # Rows sum to zero in exact arithmetic; enforcing it cancels most of the rounding, which grows as n^4.
         np.fill_diagonal(derivative, 0.0)
         np.fill_diagonal(derivative, -derivative.sum(axis=1))
-    return derivative
+        found.append(derivative)
+    return found[0], found[1]
 
 
 def _inverse_differences(intervals: int) -> FloatArray:
@@ -119,9 +121,41 @@ def even_operators(intervals: int) -> tuple[FloatArray, FloatArray]:
         Weights of the mean over [0, 1] [-].
     """
     half = intervals // 2
-    full = second_derivative(intervals)[1 : half + 1]
-    second = full[:, 1 : half + 1].copy()
-    second[:, : half - 1] += full[:, intervals - 1 : half : -1]
+    second = _folded(derivatives(intervals)[1])
     mean = clenshaw_curtis(intervals)[1 : half + 1].copy()
     mean[: half - 1] *= 2.0
     return second, mean
+
+
+def even_transport(intervals: int) -> tuple[FloatArray, FloatArray]:
+    """Return slope and integral, at the points of `even_operators`, of such a function; both are odd.
+
+    Parameters
+    ----------
+    intervals : int
+        Number n of intervals, even [-].
+
+    Returns
+    -------
+    slope : ndarray, shape (intervals/2, intervals/2)
+        First derivative at these points [-].
+    integral : ndarray, shape (intervals/2, intervals/2)
+        Integral of the interpolating polynomial from 0 to these points [-].
+    """
+    first = derivatives(intervals)[0]
+    # The integral is what has the function as its derivative and vanishes at 0, where the first row says so.
+    pinned = first.copy()
+    pinned[0] = 0.0
+    pinned[0, 0] = 1.0
+    integral = np.asarray(np.linalg.inv(pinned), np.float64)
+    integral[:, 0] = 0.0
+    return _folded(first), _folded(integral)
+
+
+def _folded(full: FloatArray) -> FloatArray:
+    """Return the rows 1 ... n/2 of an operator on all points for functions that are even and zero at the walls."""
+    intervals = len(full) - 1
+    half = intervals // 2
+    folded = full[1 : half + 1, 1 : half + 1].copy()
+    folded[:, : half - 1] += full[1 : half + 1, intervals - 1 : half : -1]
+    return folded

@@ -128,7 +128,20 @@ class ChannelStage:
         # Writable copies: the kernel is compiled for one kind of array only.
         self._gain = modes.gain.copy()
         self._z = np.zeros(modes.gain.size)
-        self._previous, self._n_done = 0.0, 0
+        self._turning, self._previous, self._n_done = 0.0, 0.0, 0
+
+    def begin(self, turning: float) -> None:
+        """Let wall and fluid have turned together before the first sample, at the rate `turning`, unit of the samples.
+
+        Raises
+        ------
+        RuntimeError
+            If samples have been processed.
+        """
+        if self._n_done:
+            msg = f"turning: expected before the first sample, got it after {self._n_done}"
+            raise RuntimeError(msg)
+        self._turning = turning
 
     def process(self, wall_rate: FloatArray) -> FloatArray:
         """Move the fluid through the next samples.
@@ -151,15 +164,9 @@ class ChannelStage:
         """
         wall = np.array(wall_rate, dtype=np.float64)
         self._check(wall)
+        wall -= self._turning
         out = np.empty_like(wall)
-        first = 1 if self._n_done == 0 else 0
-        if first:
-            # A jump takes no time: nothing decays, every mode gets all of it.
-            whole = np.ones_like(self._keep)
-            self._previous = _advance(self._z, whole, whole, self._gain, self._previous, wall[:1], out[:1])
-        self._previous = _advance(
-            self._z, self._keep, self._push, self._gain, self._previous, wall[first:], out[first:]
-        )
+        self._move(wall, out)
         self._n_done += wall.size
         return out
 
@@ -171,8 +178,23 @@ class ChannelStage:
         ndarray, shape (nodes + 1,)
             Fluid minus wall velocity at the channel's `heights`, zero at the walls, unit of the samples.
         """
-        half = -(self._modes.shape @ self._z)
+        half = self._slip()
         return np.concatenate([[0.0], half, half[-2::-1], [0.0]])
+
+    def _move(self, wall: FloatArray, out: FloatArray) -> None:
+        """Take the wall's velocity since `begin` and write minus the mean slip."""
+        first = 1 if self._n_done == 0 else 0
+        if first:
+            # A jump takes no time: nothing decays, every mode gets all of it.
+            whole = np.ones_like(self._keep)
+            self._previous = _advance(self._z, whole, whole, self._gain, self._previous, wall[:1], out[:1])
+        self._previous = _advance(
+            self._z, self._keep, self._push, self._gain, self._previous, wall[first:], out[first:]
+        )
+
+    def _slip(self) -> FloatArray:
+        """Return the slip from the first point off the wall to the centre."""
+        return -(self._modes.shape @ self._z)
 
     def _check(self, wall: FloatArray) -> None:
         if wall.ndim != 1:

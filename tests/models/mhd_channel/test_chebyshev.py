@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.models.mhd_channel.chebyshev import chebyshev_points, clenshaw_curtis, even_operators, second_derivative
+from testbed.models.mhd_channel.chebyshev import (
+    chebyshev_points,
+    clenshaw_curtis,
+    derivatives,
+    even_operators,
+    even_transport,
+)
 
 EPS = np.finfo(float).eps
 
@@ -29,7 +35,7 @@ def test_points_ascend_from_wall_to_wall_and_are_symmetric_to_the_bit(intervals:
 def test_second_derivative_is_exact_on_polynomials(intervals: int, degree: int) -> None:
     x = chebyshev_points(intervals)
     expected = degree * (degree - 1) * x ** max(degree - 2, 0)
-    matrix = second_derivative(intervals)
+    matrix = derivatives(intervals)[1]
     # Entries and sums round to eps of the largest row sum; the values are at most 1.
     bound = 4 * EPS * np.abs(matrix).sum(axis=1).max()
     np.testing.assert_allclose(matrix @ x**degree, expected, rtol=0, atol=bound)
@@ -43,7 +49,7 @@ def test_second_derivative_converges_spectrally_on_a_boundary_layer() -> None:
     for intervals in (8, 16, 32):
         x = chebyshev_points(intervals)
         u = np.exp(-x / layer)
-        errors.append(np.max(np.abs(layer**2 * (second_derivative(intervals) @ u) - u)))
+        errors.append(np.max(np.abs(layer**2 * (derivatives(intervals)[1] @ u) - u)))
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     # No algebraic order describes it: each doubling gains more digits than the one before.
     assert orders[1] > 2 * orders[0] > 10.0
@@ -84,3 +90,16 @@ def test_even_operators_have_the_eigenvalues_of_the_heat_equation() -> None:
     odd = np.arange(1, 40, 2)
     # Up to about 2n/pi points per half-wave the spectrum is the true one; rounding is eps times the largest eigenvalue.
     np.testing.assert_allclose(values[:20], (np.pi * odd) ** 2, rtol=0, atol=EPS * values[-1] * 10)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("intervals", [8, 64, 160])
+def test_slope_and_integral_are_exact_on_an_even_polynomial(intervals: int) -> None:
+    half = intervals // 2
+    x = chebyshev_points(intervals)[1 : half + 1]
+    slope, integral = even_transport(intervals)
+    # f = x (1 - x) is even about the centre and zero at the walls.
+    bound = 4 * EPS * np.abs(slope).sum(axis=1).max()
+    np.testing.assert_allclose(slope @ (x * (1 - x)), 1 - 2 * x, rtol=0, atol=bound)
+    np.testing.assert_allclose(integral @ (x * (1 - x)), x**2 / 2 - x**3 / 3, rtol=0, atol=1e3 * EPS)
+    assert bound < 1e-9
