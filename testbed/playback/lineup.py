@@ -27,6 +27,7 @@ FEWEST = 4
 _SAME = 1e-9
 # Instants that are one [ns].
 _SAME_NS = 0.5
+_BEFORE = 1.5
 # Beyond this many steps of the reference from its nearest known samples there is no reference.
 _REACH = 1.5
 
@@ -81,7 +82,7 @@ class Lineup:
     def times(self) -> dict[str, FloatArray]:
         """Return the stamps of ``base`` and of every sensor, shape (n_time,) [s]."""
         if self.stamps_ns is not None:
-            return {name: NANO * stamps for name, stamps in self.stamps_ns.items()}
+            return {name: (NANO * stamps).astype(np.float64) for name, stamps in self.stamps_ns.items()}
         found = {name: np.arange(values.size) / self.rates[name] for name, values in self.readings.items()}
         return {"base": np.arange(self.n_time) / self.rates["base"], **found}
 
@@ -155,9 +156,12 @@ def line_up(reels: Sequence[Reel], reference: Reel | None, file: str) -> Lineup:
 
 
 def _by_stamps(reels: Sequence[Reel], fastest: Reel, reference: Reel | None) -> Lineup:
-    """Return the sensors at their own stamps, from the first of the fastest after all have begun to its last."""
+    """Return the sensors at their own stamps, from where all have begun to the last of the fastest.
+
+    A sensor has begun a step and a half before its first reading: of what was cut so nothing is cut another time.
+    """
     all_stamps = {reel.name: reel.stamps() for reel in reels}
-    begun = max(int(stamps[0]) for stamps in all_stamps.values())
+    begun = max(all_stamps[reel.name][0] - _BEFORE / (NANO * reel.sample_rate_hz) for reel in reels)
     clock = all_stamps[fastest.name]
     start, end = int(clock[np.searchsorted(clock, begun)]), int(clock[-1])
     readings, stamps_ns, dropped, references = {}, {}, {}, {}

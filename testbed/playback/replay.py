@@ -322,9 +322,7 @@ def _channel(channel: LogChannel, reel: Reel, lineup: Lineup) -> dict[str, Any]:
     }
 
 
-def _facts(
-    source: ReplaySource, reels: Sequence[Reel], reference: Reel | None, lineup: Lineup
-) -> ReplayMetrics:
+def _facts(source: ReplaySource, reels: Sequence[Reel], reference: Reel | None, lineup: Lineup) -> ReplayMetrics:
     channels = {
         reel.name: {
             **_channel(source.sensors[reel.name], reel, lineup),

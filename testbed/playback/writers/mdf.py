@@ -34,5 +34,5 @@ def write_mdf(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str]
                     file.append([signal], acq_name=track.name)
         file.save(folder / FILE, overwrite=True)
     # The reader names groups where there are several.
-    stamps = {track.name: f"{track.name}/time" if len(tracks) > 1 else "time" for track in tracks}
-    return {track.name: {"file": FILE, "column": track.name, "stamps": stamps[track.name]} for track in tracks}
+    clocks = {track.name: f"{track.name}/time" if len(tracks) > 1 else "time" for track in tracks}
+    return {track.name: {"file": FILE, "column": track.name, "stamps": clocks[track.name]} for track in tracks}

@@ -26,5 +26,5 @@ def write_tdms(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
                 times = ChannelObject(track.name, "t", stamps, properties={"unit_string": "ns"})
                 file.write_segment([times, ChannelObject(track.name, track.name, rate, properties=waveform)])
     # The reader names groups where there are several.
-    stamps = {track.name: f"{track.name}/t" if len(tracks) > 1 else "t" for track in tracks}
-    return {track.name: {"file": FILE, "column": track.name, "stamps": stamps[track.name]} for track in tracks}
+    clocks = {track.name: f"{track.name}/t" if len(tracks) > 1 else "t" for track in tracks}
+    return {track.name: {"file": FILE, "column": track.name, "stamps": clocks[track.name]} for track in tracks}
