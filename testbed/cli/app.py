@@ -14,6 +14,7 @@ from testbed.cli.commands import (
     folder,
     log,
     parts,
+    playback,
     pointing,
     psd,
     reproduce,
@@ -37,6 +38,8 @@ app.command()(folder.view)
 app.command()(folder.report)
 app.command()(allan.allan)
 app.command()(psd.psd)
+app.command()(playback.replay)
+app.command()(playback.export)
 app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)

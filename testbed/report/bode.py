@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -68,7 +68,7 @@ def _marker(group: str) -> str:
     return _SENSOR if group.startswith("sensors/") else _FILTER
 
 
-def _responses(metrics: RunMetrics, colors: Mapping[str, str]) -> Iterator[tuple[Response, str, object]]:
+def _responses(metrics: RunMetrics, colors: Mapping[str, str]) -> Iterator[tuple[Response, str, Any]]:
     if metrics.responses is not None:
         for name, response in metrics.responses.sensors.items():
             yield response, colors[f"sensors/{name}"], "-"
@@ -77,10 +77,10 @@ def _responses(metrics: RunMetrics, colors: Mapping[str, str]) -> Iterator[tuple
                 yield response, colors[f"sensors/{name}"], _BELIEVED
 
 
-def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Response, look: tuple[str, object]) -> None:
+def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Response, look: tuple[str, Any]) -> None:
     assert metrics.responses is not None
     freq = np.array(metrics.responses.frequency_hz)[: len(response.gain)]
-    style = {"color": look[0], "linestyle": look[1], "linewidth": 1.3}
+    style: dict[str, Any] = {"color": look[0], "linestyle": look[1], "linewidth": 1.3}
     gain.plot(freq, response.gain, **style)
     phase.plot(freq, response.phase_deg, **style)
 
@@ -88,7 +88,7 @@ def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Respo
 def _draw_points(panels: tuple[Axes, Axes, Axes], transfer: Transfer, color: str, marker: str) -> None:
     gain, phase, coherence = panels
     told = transfer.coherence > transfer.chance
-    style = {"color": color, "marker": marker, "linestyle": "none", "markersize": 2.6, "alpha": 0.8}
+    style: dict[str, Any] = {"color": color, "marker": marker, "linestyle": "none", "markersize": 2.6, "alpha": 0.8}
     gain.plot(transfer.freq_hz[told], np.abs(transfer.response[told]), **style)
     phase.plot(transfer.freq_hz[told], np.degrees(np.angle(transfer.response[told])), **style)
     coherence.plot(transfer.freq_hz, transfer.coherence, **style)
@@ -98,9 +98,15 @@ def _draw_lines(gain: Axes, phase: Axes, metrics: RunMetrics, group: str, color:
     lines = [
         one for one in metrics.sources[group.split("/", 1)[1]].lines or [] if one.gain and one.phase_deg is not None
     ]
-    style = {"color": color, "marker": _marker(group), "linestyle": "none", "markersize": 6.5, "fillstyle": "none"}
-    gain.plot([one.frequency_hz for one in lines], [one.gain for one in lines], **style)
-    phase.plot([one.frequency_hz for one in lines], [one.phase_deg for one in lines], **style)
+    style: dict[str, Any] = {
+        "color": color,
+        "marker": _marker(group),
+        "linestyle": "none",
+        "markersize": 6.5,
+        "fillstyle": "none",
+    }
+    gain.plot([one.frequency_hz for one in lines], [one.gain or 0.0 for one in lines], **style)
+    phase.plot([one.frequency_hz for one in lines], [one.phase_deg or 0.0 for one in lines], **style)
 
 
 def _frame(panels: tuple[Axes, Axes, Axes]) -> None:

@@ -28,7 +28,8 @@ def closer_views(digest: Digest, colors: Mapping[str, str], unit: Unit) -> list[
         Unit of the rates, and what deg/s is multiplied by for it.
     """
     rates = {group: trace.close for group, trace in digest.rates.items()}
-    errors = {f"fusion/{name}": trace.close for name, trace in digest.filter_errors.items() if trace.close is not None}
+    shown_errors = digest.filter_errors if digest.has_truth else {}
+    errors = {f"fusion/{name}": trace.close for name, trace in shown_errors.items() if trace.close is not None}
     views = [
         ("Sensors", f"rate [{unit[0]}]", _beside_truth(rates, "sensors/")),
         ("Filters", f"rate [{unit[0]}]", _beside_truth(rates, "fusion/")),
@@ -46,7 +47,8 @@ def closer_views(digest: Digest, colors: Mapping[str, str], unit: Unit) -> list[
 
 
 def _beside_truth(rates: Mapping[str, Envelope], kind: str) -> dict[str, Envelope]:
-    return {group: one for group, one in rates.items() if group.startswith(kind)} | {"truth": rates["truth"]}
+    beside = {"truth": rates["truth"]} if "truth" in rates else {}
+    return {group: one for group, one in rates.items() if group.startswith(kind)} | beside
 
 
 def _trace(group: str, envelope: Envelope, color: str, scale: float) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from testbed.pages.envelope import Envelope
     from testbed.report.within import Correlations
+    from testbed.signals import FloatArray
 
 _NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of"}
 _MARKERS = ("o", "s", "^", "D", "v")
@@ -115,21 +116,18 @@ def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Ma
     return figure
 
 
-def _draw_correlations(axes: Axes, values: Sequence[float], color: str, turn: int) -> None:
-    lags = np.arange(1, len(values) + 1)
-    axes.plot(
-        lags, values, color=color, linewidth=1.1, linestyle=DASHES[turn % len(DASHES)],
-        marker=_MARKERS[turn % len(_MARKERS)], markersize=3.2,
-    )  # fmt: skip
+def _draw_correlations(axes: Axes, values: FloatArray, color: str, turn: int) -> None:
+    axes.plot(np.arange(1, len(values) + 1), values, color=color, linewidth=1.1, markersize=3.2, **_look(turn))
+
+
+def _look(turn: int) -> dict[str, Any]:
+    return {"linestyle": DASHES[turn % len(DASHES)], "marker": _MARKERS[turn % len(_MARKERS)]}
 
 
 def _style_handles(filters: Sequence[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D(
-            [], [], color=colors[f"fusion/{name}"], linewidth=1.4, linestyle=DASHES[i % len(DASHES)],
-            marker=_MARKERS[i % len(_MARKERS)], markersize=3.5, label=label(name),
-        )
+        Line2D([], [], color=colors[f"fusion/{name}"], linewidth=1.4, markersize=3.5, label=label(name), **_look(i))
         for i, name in enumerate(filters)
-    ]  # fmt: skip
+    ]
     handles.append(Line2D([], [], color=INK, alpha=0.3, linewidth=6.0, label="95 % of chance, if white"))
     return handles
