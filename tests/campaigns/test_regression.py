@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import testbed
 from testbed.campaigns.agenda import play
 from testbed.campaigns.regression import standard
-from testbed.campaigns.regression.compare import LIMIT_DEG, in_words, moves, incomparable
+from testbed.campaigns.regression.compare import LIMIT_DEG, in_words, incomparable, moves
 from testbed.campaigns.regression.history import NUMBERS, append, latest, read_history
 from testbed.campaigns.regression.leaderboard import standings
 from testbed.campaigns.regression.regress import run_regression

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.campaigns.regression.compare import Move, moves, incomparable
+from testbed.campaigns.regression.compare import Move, incomparable, moves
 from testbed.campaigns.regression.history import HISTORY, append, essence, latest, read_history
 from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
 from testbed.campaigns.regression.page import write_leaderboard
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 class Outcome:
     """What came of a standard campaign.
 
-    `moves` is what is no longer as in the baseline, `incomparable` what has none, `standings` the leaderboard, `failures`
-    the rows of cases that failed, `cpu_seconds` the processor time of this launch.
+    `moves` is what is no longer as in the baseline, `incomparable` what has none, `standings` the leaderboard,
+    `failures` the rows of cases that failed, `cpu_seconds` the processor time of this launch.
     """
 
     folder: Path
