@@ -17,6 +17,7 @@ from testbed.cli.commands import (
     playback,
     pointing,
     psd,
+    regress,
     reproduce,
     scenario,
     sweep,
@@ -44,6 +45,7 @@ app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)
 app.command()(sweep.sweep)
+app.command()(regress.regress)
 app.add_typer(compensate.app)
 app.add_typer(log.app)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from testbed.fusion.analysis.finding import Finding
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
@@ -59,11 +60,14 @@ class EstimateBlock:
         R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
         of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
         guard_hits counts how often a bound held R or Q so far.
+    findings : tuple of Finding, optional
+        What stands against the readings, where `estimate` looked (`testbed.fusion.analysis.verdict`).
     """
 
     rate: FloatArray
     std: FloatArray
     diagnostics: dict[str, FloatArray]
+    findings: tuple[Finding, ...] = ()
 
 
 class Rows(NamedTuple):
