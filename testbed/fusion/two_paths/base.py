@@ -177,7 +177,8 @@ class TwoPaths(BlockFilter):
         self._memory = np.zeros(MEMORY_ENTRIES)
         self._memory[VARIANCE] = REST_STD**2 if rest else unknown
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    # Its paths step at regular steps only.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
 
 
