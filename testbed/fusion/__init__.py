@@ -5,14 +5,20 @@ A filter is built from (belief, sample rates, parameters) and turns blocks of re
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from testbed.errors import VerdictWarning
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from testbed.fusion.base import EstimateBlock
+    from testbed.fusion.belief import SensorBelief
 
 __all__ = ["FILTERS", "EstimateBlock", "estimate", "list_filters"]
 
@@ -50,6 +56,7 @@ def estimate(
     time_ns: Mapping[str, ArrayLike] | None = None,
     belief: Mapping[str, Any] | str | None = None,
     plugins: Iterable[str] = (),
+    verdict: bool = True,
     **parameters: Any,
 ) -> EstimateBlock:
     """Run the filter `name` over whole records, such as from one's own logger.
@@ -71,6 +78,9 @@ def estimate(
         a shipped belief; default equation (39) with the presets' noise. "exact" is refused: arrays are no simulation.
     plugins : iterable of str, optional
         Modules that are loaded first, dotted or as paths of ``.py`` files, besides those of ``TESTBED_PLUGINS``.
+    verdict : bool, optional
+        Say first what stands against the readings: each finding is a `VerdictWarning`, and all are the `findings` of
+        what is returned. False for readings that are wrong on purpose, or were judged before.
     **parameters : Any
         Fields of the filter's ``Parameters``, SI floats or strings with units; a class without them gets the mapping.
 
@@ -92,24 +102,23 @@ def estimate(
 
     Examples
     --------
-    A second at rest, as two sensors without noise would read it: the estimate is zero, with the std that the belief
-    in their noise leaves.
+    A second at rest, as two sensors without noise would read it, which the verdict would take for stuck: the estimate
+    is zero, with the std that the belief in their noise leaves.
 
     >>> import numpy as np
     >>> readings = {"mhd_ars": np.zeros(20_000), "mems_gyro": np.zeros(2_000)}
-    >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3})
+    >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3}, verdict=False)
     >>> found.rate.shape, bool(np.all(found.rate == 0.0)), bool(found.std[-1] < found.std[0])
     ((20000,), True, True)
 
     The same with stamps, the gyro's on a clock that is 0.2 % fast and half a millisecond late.
 
     >>> stamps = {"mhd_ars": np.arange(20_000) * 50_000, "mems_gyro": 500_000 + np.arange(2_000) * 499_000}
-    >>> found = estimate("kalman", readings, time_ns=stamps)
+    >>> found = estimate("kalman", readings, time_ns=stamps, verdict=False)
     >>> found.rate.shape, found.time_ns[-1]
     ((20000,), np.int64(999950000))
     """
-    from dataclasses import replace
-
+    from testbed.fusion.analysis.verdict import even_stamps
     from testbed.fusion.belief import default_belief, load_belief
     from testbed.fusion.checked import CheckedFilter
     from testbed.fusion.stamps import rates_of, regular, sorted_by_time
@@ -131,8 +140,26 @@ def estimate(
     stage = CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped)
     if time_ns is not None and regular(time_ns, sample_rate_hz):
         shown = time_ns[max(sample_rate_hz, key=lambda sensor: sample_rate_hz[sensor])]
-        return replace(stage.process(readings), time_ns=shown)
-    return stage.process(readings, time_ns)
+        block = replace(stage.process(readings), time_ns=shown)
+    else:
+        block = stage.process(readings, time_ns)
+    stamps = even_stamps(readings, sample_rate_hz) if time_ns is None else time_ns
+    return _told(block, readings, stamps, believed) if verdict else block
+
+
+def _told(
+    block: EstimateBlock,
+    readings: Mapping[str, ArrayLike],
+    time_ns: Mapping[str, NDArray[np.int64]],
+    belief: Mapping[str, SensorBelief],
+) -> EstimateBlock:
+    """Return an estimate with what stands against its readings, and warn of each."""
+    from testbed.fusion.analysis.verdict import verdict
+
+    findings = verdict(readings, time_ns, belief).findings
+    for one in findings:
+        warnings.warn(str(one), VerdictWarning, stacklevel=3)
+    return replace(block, findings=findings)
 
 
 def __getattr__(name: str) -> Any:

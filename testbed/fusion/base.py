@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from testbed.fusion.analysis.finding import Finding
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
@@ -67,12 +68,15 @@ class EstimateBlock:
         sensor stands at the next stamp of the fastest one, and late_<sensor> counts those that came too late so far.
     time_ns : ndarray of int, shape (n_time,), optional
         Stamps of the fastest sensor [ns], of readings that have some; those that came too late are left out.
+    findings : tuple of Finding, optional
+        What stands against the readings, where `estimate` looked (`testbed.fusion.analysis.verdict`).
     """
 
     rate: FloatArray
     std: FloatArray
     diagnostics: dict[str, FloatArray]
     time_ns: NDArray[np.int64] | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 class Received(NamedTuple):

@@ -51,7 +51,7 @@ def even(*matrices: NDArray[Any]) -> tuple[np.ndarray, ...]:
 
     Parameters
     ----------
-    *matrices : ndarray
+    *matrices : ndarray, of any shape
         Those that it has a table of: F, Q.
     """
     return (*EVEN, *(np.empty((0, *one.shape), one.dtype) for one in matrices))

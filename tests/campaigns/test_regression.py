@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 import testbed
 from testbed.campaigns.agenda import play
 from testbed.campaigns.regression import standard
-from testbed.campaigns.regression.compare import LIMIT_DEG, in_words, moves, strangers
+from testbed.campaigns.regression.compare import LIMIT_DEG, in_words, incomparable, moves
 from testbed.campaigns.regression.history import NUMBERS, append, latest, read_history
 from testbed.campaigns.regression.leaderboard import standings
 from testbed.campaigns.regression.regress import run_regression
-from testbed.campaigns.regression.standard import AXES, SHORT, STANDARD, Entry, Setting, published, standard_study
+from testbed.campaigns.regression.standard import AXES, SHORT, STANDARD, Contenders, Setting, published, standard_study
 from testbed.campaigns.statistics import holm
 from testbed.cli.app import app
 from testbed.errors import ScenarioError
@@ -91,12 +91,12 @@ def test_what_is_undefined_in_one_of_the_two_is_said():
 def test_what_is_new_or_gone_is_named_and_does_not_fail():
     before, now = [*made(), *made("old")], [*made(), *made("mine"), *made(case=("10 Hz", "in motion"))]
     assert moves(now, before) == []
-    assert strangers(now, before) == [
+    assert incomparable(now, before) == [
         "mine has no baseline yet",
         "kalman, 10 Hz, in motion: has no baseline yet",
         "old is gone",
     ]
-    assert strangers(now, []) == ["everything has no baseline yet"]
+    assert incomparable(now, []) == ["everything has no baseline yet"]
 
 
 def test_holm_is_the_step_down_of_its_paper():
@@ -147,21 +147,21 @@ def tiny(monkeypatch):
     monkeypatch.setattr(standard, "_short_settings", lambda: [Setting("100 Hz")])
     monkeypatch.setitem(standard._SEEDS, SHORT, 2)
     monkeypatch.setattr(
-        "testbed.campaigns.regression.regress.shipped", lambda: Entry({"kalman": {}, "complementary": {}})
+        "testbed.campaigns.regression.regress.shipped", lambda: Contenders({"kalman": {}, "complementary": {}})
     )
 
 
 def test_a_published_filter_enters_by_one_file_and_one_command(tiny, tmp_path):
     history = tmp_path / "history.parquet"
     first = run_regression(short=True, out=tmp_path / "all", update="First.", history=history)
-    assert first.strangers == ["everything has no baseline yet"]
+    assert first.incomparable == ["everything has no baseline yet"]
     again = run_regression(short=True, out=tmp_path / "all", history=history)
-    assert (list(again.moves), again.strangers) == ([], [])
+    assert (list(again.moves), again.incomparable) == ([], [])
     entry = published(["own_filter:Blend"], [str(EXAMPLES / "own_filter.py")])
     mine = run_regression(entry, short=True, out=tmp_path / "mine", history=history)
     assert {one.name for one in mine.standings} == {"kalman", "complementary", "Blend"}
     assert list(mine.moves) == []
-    assert mine.strangers == ["Blend has no baseline yet"]
+    assert mine.incomparable == ["Blend has no baseline yet"]
     assert all(one.cost is not None for one in mine.standings)
     page = (mine.folder / "leaderboard.html").read_text("utf-8")
     assert "--filter=own_filter:Blend" in page
@@ -213,6 +213,6 @@ def test_the_command_says_what_moved_by_its_status(tiny, tmp_path, monkeypatch):
 
 
 def test_one_point_has_a_command(tmp_path):
-    study = standard_study(Entry({"kalman": {}}), short=True)
+    study = standard_study(Contenders({"kalman": {}}), short=True)
     assert study.command == "testbed regress --short"
     assert published(["m:A"], ["m.py"]).words == ["--plugin=m.py", "--filter=m:A"]

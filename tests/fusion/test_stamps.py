@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from testbed.fusion import FILTERS, EstimateBlock, estimate
+from testbed.fusion import FILTERS, EstimateBlock
+from testbed.fusion import estimate as judged
 from testbed.fusion.belief import default_belief
 from testbed.fusion.kernels.covariance import NODES
 from testbed.fusion.model import FusionModel, build_model
@@ -25,6 +27,7 @@ DEG = np.pi / 180.0
 STEPPING = [name for name in FILTERS if resolve("filter", name, FILTERS).any_clock]
 REGULAR_ONLY = [name for name in FILTERS if name not in STEPPING]
 
+estimate = partial(judged, verdict=False)
 Stamped = tuple[dict[str, FloatArray], dict[str, "NDArray[np.int64]"]]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import testbed
-from testbed.campaigns.regression.history import kept, latest, read_history
+from testbed.campaigns.regression.history import essence, latest, read_history
 from testbed.campaigns.regression.regress import run_regression
 from testbed.campaigns.regression.standard import SHORT
 from testbed.fusion import FILTERS
@@ -28,7 +28,7 @@ def found(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rows(found):
-    return kept(testbed.open_sweep(found.folder).to_pylist())
+    return essence(testbed.open_sweep(found.folder).to_pylist())
 
 
 def test_nothing_has_moved(found):
@@ -41,7 +41,7 @@ def test_the_baseline_has_every_case_of_this_version(found, rows):
     stored = latest(read_history(), SHORT)
     assert {row["source"] for row in stored} <= {row["source"] for row in rows}
     assert {row["signal"] for row in stored} == {*LINES, "mixed"}
-    assert not [words for words in found.strangers if ", " in words]
+    assert not [words for words in found.incomparable if ", " in words]
 
 
 def of(rows, source, signal):

@@ -79,12 +79,12 @@ _USUAL = ("rest", "none", "exact", "sx300, adis16505_filtered")
 def moves(now: Iterable[Row], before: Iterable[Row]) -> list[Move]:
     """Return what is no longer what it was: beyond 0.5 dB, or by more than chance.
 
-    Sources and cases that are in one of the two only are left out (`strangers` names them).
+    Sources and cases that are in one of the two only are left out (`incomparable` names them).
 
     Parameters
     ----------
     now, before : iterable of mapping
-        Rows as `testbed.campaigns.regression.history.kept` gives them.
+        Rows as `testbed.campaigns.regression.history.essence` gives them.
     """
     new, old = _grouped(now), _grouped(before)
     found = []
@@ -98,7 +98,7 @@ def moves(now: Iterable[Row], before: Iterable[Row]) -> list[Move]:
     return [one for one in judged if _fails(one)]
 
 
-def strangers(now: Iterable[Row], before: Iterable[Row]) -> list[str]:
+def incomparable(now: Iterable[Row], before: Iterable[Row]) -> list[str]:
     """Return what cannot be compared, in words: new sources and cases, and those that are gone.
 
     Parameters

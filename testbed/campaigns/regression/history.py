@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     Row = Mapping[str, Any]
 
 HISTORY = Path(str(resources.files("testbed.campaigns.regression") / "history.parquet"))
-# Of each row of a campaign, what is kept; gain and phase are of the first line.
+# Of each row of a campaign, what is stored; gain and phase are of the first line.
 NUMBERS = ("rmse_deg_s", "mean_std_deg_s", "nees", "optimum_rmse_deg_s", "floor_rmse_deg_s", "gain", "phase_deg")
 _TEXTS = ("campaign", "version", "reason", "kind", "source", *AXES)
 
 
-def kept(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """Return what is kept of the rows of a campaign, its failures left out.
+def essence(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Return what is stored of the rows of a campaign, its failures left out.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def append(rows: Iterable[Row], costs: Mapping[str, float], campaign: str, reaso
     Parameters
     ----------
     rows : iterable of mapping
-        As `kept` gives them.
+        As `essence` gives them.
     costs : mapping of str to float
         Time of a filter over that of `kalman` [-].
     campaign : str

@@ -68,7 +68,7 @@ def standings(rows: Iterable[Row], costs: Mapping[str, float]) -> list[Standing]
     Parameters
     ----------
     rows : iterable of mapping
-        As `testbed.campaigns.regression.history.kept` gives them.
+        As `testbed.campaigns.regression.history.essence` gives them.
     costs : mapping of str to float
         Time of a filter over that of `kalman` [-].
     """

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.campaigns.regression.compare import Move, moves, strangers
-from testbed.campaigns.regression.history import HISTORY, append, kept, latest, read_history
+from testbed.campaigns.regression.compare import Move, incomparable, moves
+from testbed.campaigns.regression.history import HISTORY, append, essence, latest, read_history
 from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
 from testbed.campaigns.regression.page import write_leaderboard
-from testbed.campaigns.regression.standard import SHORT, STANDARD, Entry, shipped, standard_study
+from testbed.campaigns.regression.standard import SHORT, STANDARD, Contenders, shipped, standard_study
 from testbed.campaigns.rows import OK
 from testbed.campaigns.store import STUDY, read_cases
 from testbed.campaigns.sweep import sweep
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 class Outcome:
     """What came of a standard campaign.
 
-    `moves` is what is no longer as in the baseline, `strangers` what has none, `standings` the leaderboard, `failures`
-    the rows of cases that failed, `cpu_seconds` the processor time of this launch.
+    `moves` is what is no longer as in the baseline, `incomparable` what has none, `standings` the leaderboard,
+    `failures` the rows of cases that failed, `cpu_seconds` the processor time of this launch.
     """
 
     folder: Path
     moves: Sequence[Move]
-    strangers: Sequence[str]
+    incomparable: Sequence[str]
     standings: Sequence[Standing]
     failures: Sequence[Mapping[str, Any]]
     cpu_seconds: float
 
 
 def run_regression(
-    entry: Entry | None = None,
+    entry: Contenders | None = None,
     *,
     short: bool = False,
     update: str | None = None,
@@ -57,7 +57,7 @@ def run_regression(
 
     Parameters
     ----------
-    entry : Entry, optional
+    entry : Contenders, optional
         Filters to play, which join the leaderboard of the baseline; all that ship if not given.
     short : bool, optional
         The short form.
@@ -87,7 +87,7 @@ def run_regression(
     _begin(target, study)
     folder = sweep(study, workers=workers, out=target, progress=progress)
     table = read_cases(folder).to_pylist()
-    rows, failures = kept(table), [row for row in table if row["status"] != OK]
+    rows, failures = essence(table), [row for row in table if row["status"] != OK]
     stored = read_history(history)
     campaign = SHORT if short else STANDARD
     before, costs = latest(stored, campaign), costs_of(study.cases[0].scenario)
@@ -96,7 +96,7 @@ def run_regression(
     others = [row for row in before if entry is not None and row["source"] not in mine]
     costs = {row["source"]: row["cost"] for row in others if row["cost"] is not None} | costs
     order, spent = standings([*others, *rows], costs), _spent() - begun
-    found = Outcome(folder, moves(rows, same), strangers(rows, same), order, failures, spent)
+    found = Outcome(folder, moves(rows, same), incomparable(rows, same), order, failures, spent)
     if update is not None:
         if failures:
             raise ScenarioError([Problem(f"{len(failures)} runs failed, first: {failures[0]['reason']}", "--update")])

@@ -103,7 +103,7 @@ def _short_settings() -> list[Setting]:
 
 
 @dataclass(frozen=True)
-class Entry:
+class Contenders:
     """Filters that are played, by name: their entries in a scenario, and the plug-ins that they come from."""
 
     fusion: Mapping[str, Mapping[str, Any]]
@@ -116,9 +116,9 @@ class Entry:
         return [*(f"--plugin={one}" for one in self.plugins), *(f"--filter={one}" for one in given)]
 
 
-def shipped() -> Entry:
+def shipped() -> Contenders:
     """Return all filters of the house that need no word, each as it is without one."""
-    return Entry({name: {} for name in FILTERS if _speaks_for_itself(name)})
+    return Contenders({name: {} for name in FILTERS if _speaks_for_itself(name)})
 
 
 def _speaks_for_itself(name: str) -> bool:
@@ -129,7 +129,7 @@ def _speaks_for_itself(name: str) -> bool:
     return True
 
 
-def published(filters: Iterable[str], plugins: Sequence[str]) -> Entry:
+def published(filters: Iterable[str], plugins: Sequence[str]) -> Contenders:
     """Return filters of plug-ins.
 
     Parameters
@@ -139,15 +139,15 @@ def published(filters: Iterable[str], plugins: Sequence[str]) -> Entry:
     plugins : sequence of str
         Modules, dotted or as paths.
     """
-    return Entry({one.rsplit(":", maxsplit=1)[-1]: {"type": one} for one in filters}, plugins)
+    return Contenders({one.rsplit(":", maxsplit=1)[-1]: {"type": one} for one in filters}, plugins)
 
 
-def standard_study(entry: Entry, *, short: bool = False) -> Study:
+def standard_study(entry: Contenders, *, short: bool = False) -> Study:
     """Return the standard campaign of some filters.
 
     Parameters
     ----------
-    entry : Entry
+    entry : Contenders
         Which.
     short : bool, optional
         Its short form.
@@ -166,7 +166,7 @@ def standard_study(entry: Entry, *, short: bool = False) -> Study:
     return Study(f"regress_{name}", text, "", AXES, cases, seeds, command=shlex.join(words))
 
 
-def _scenario(setting: Setting, entry: Entry, *, short: bool) -> Scenario:
+def _scenario(setting: Setting, entry: Contenders, *, short: bool) -> Scenario:
     fast, slow, belief = _PRESETS[setting.preset]
     duration, settle = (2, 1) if short else (6, 3)
     mapping: dict[str, Any] = {

@@ -65,7 +65,7 @@ def _document(found: Outcome) -> dict[str, Any]:
     return {
         "standings": [_defined(asdict(one)) for one in found.standings],
         "moves": [_defined(asdict(one)) for one in found.moves],
-        "without_baseline": list(found.strangers),
+        "without_baseline": list(found.incomparable),
         "failures": [{name: row[name] for name in ("case", "seed", "reason")} for row in found.failures],
         "cpu_seconds": found.cpu_seconds,
         "written": str(found.folder),
@@ -90,7 +90,7 @@ def _print(found: Outcome) -> None:
     lines = [
         *(f"failed: case {row['case']}, seed {row['seed']}: {row['reason']}" for row in found.failures),
         *(f"moved: {one.words()}" for one in found.moves),
-        *found.strangers,
+        *found.incomparable,
     ]
     for line in lines[:_MOST_LINES]:
         console.print(line, soft_wrap=True, highlight=False)
