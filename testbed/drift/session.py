@@ -19,6 +19,7 @@ from testbed.document import findings
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.records import ThermalRecord, check_options, read_thermal
+from testbed.drift.summary import start_summary
 from testbed.errors import Problem, ScenarioError, UnknownNameError, shortened
 from testbed.inputs.files import read_bytes
 from testbed.runs.atomic import write_text
@@ -185,7 +186,8 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     Returns
     -------
     dict
-        Method, name of the record and the share of its samples outside the trained range.
+        Method, name of the record, the share of its samples outside the trained range and how far from the trained
+        ones it starts.
 
     Raises
     ------
@@ -206,7 +208,12 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
-    return {"method": model.method, "record": thermal.name, "extrapolated": float(block.extrapolated.mean())}
+    return {
+        "method": model.method,
+        "record": thermal.name,
+        "extrapolated": float(block.extrapolated.mean()),
+        **start_summary(model.start_distance(thermal.record)),
+    }
 
 
 def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> Audited:
@@ -264,4 +271,5 @@ def _audit_trained(
     found = find_leaks(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
     found = replace(found, seen=thermal.fingerprint in trained_on)
     name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
-    return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))
+    away = model.start_distance(thermal.record)
+    return Audited(name, thermal, block.rate, found, outside, away, tuple(trained_on.values()))

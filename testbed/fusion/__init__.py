@@ -5,14 +5,20 @@ A filter is built from (belief, sample rates, parameters) and turns blocks of re
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from testbed.errors import VerdictWarning
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from testbed.fusion.base import EstimateBlock
+    from testbed.fusion.belief import SensorBelief
 
 __all__ = ["FILTERS", "EstimateBlock", "estimate", "list_filters"]
 
@@ -26,6 +32,8 @@ FILTERS = {
     "blending": "testbed.fusion.filters.blending:Blending",
     "wideband": "testbed.fusion.filters.wideband:Wideband",
     "allan_srkf": "testbed.fusion.filters.allan_srkf:AllanSrkf",
+    "vb_akf": "testbed.fusion.filters.vb_akf:VbAkf",
+    "imm": "testbed.fusion.filters.imm:Imm",
 }
 
 
@@ -47,6 +55,7 @@ def estimate(
     sample_rate_hz: Mapping[str, float],
     belief: Mapping[str, Any] | str | None = None,
     plugins: Iterable[str] = (),
+    verdict: bool = True,
     **parameters: Any,
 ) -> EstimateBlock:
     """Run the filter `name` over whole records, such as from one's own logger.
@@ -65,6 +74,9 @@ def estimate(
         a shipped belief; default equation (39) with the presets' noise. "exact" is refused: arrays are no simulation.
     plugins : iterable of str, optional
         Modules that are loaded first, dotted or as paths of ``.py`` files, besides those of ``TESTBED_PLUGINS``.
+    verdict : bool, optional
+        Say first what stands against the readings: each finding is a `VerdictWarning`, and all are the `findings` of
+        what is returned. False for readings that are wrong on purpose, or were judged before.
     **parameters : Any
         Fields of the filter's ``Parameters``, SI floats or strings with units; a class without them gets the mapping.
 
@@ -84,15 +96,16 @@ def estimate(
 
     Examples
     --------
-    A second at rest, as two sensors without noise would read it: the estimate is zero, with the std that the belief
-    in their noise leaves.
+    A second at rest, as two sensors without noise would read it, which the verdict would take for stuck: the estimate
+    is zero, with the std that the belief in their noise leaves.
 
     >>> import numpy as np
     >>> readings = {"mhd_ars": np.zeros(20_000), "mems_gyro": np.zeros(2_000)}
-    >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3})
+    >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3}, verdict=False)
     >>> found.rate.shape, bool(np.all(found.rate == 0.0)), bool(found.std[-1] < found.std[0])
     ((20000,), True, True)
     """
+    from testbed.fusion.analysis.verdict import even_stamps
     from testbed.fusion.belief import default_belief, load_belief
     from testbed.fusion.checked import CheckedFilter
     from testbed.inputs.plugins import load_plugins
@@ -104,7 +117,24 @@ def estimate(
     model = getattr(cls, "Parameters", dict)
     inner = cls(believed, sample_rate_hz, model(**parameters))
     label, shipped = (name, name in FILTERS) if isinstance(name, str) else (cls.__qualname__, False)
-    return CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped).process(readings)
+    stage = CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped)
+    block = stage.process(readings)
+    return _told(block, readings, even_stamps(readings, sample_rate_hz), believed) if verdict else block
+
+
+def _told(
+    block: EstimateBlock,
+    readings: Mapping[str, ArrayLike],
+    time_ns: Mapping[str, NDArray[np.int64]],
+    belief: Mapping[str, SensorBelief],
+) -> EstimateBlock:
+    """Return an estimate with what stands against its readings, and warn of each."""
+    from testbed.fusion.analysis.verdict import verdict
+
+    findings = verdict(readings, time_ns, belief).findings
+    for one in findings:
+        warnings.warn(str(one), VerdictWarning, stacklevel=3)
+    return replace(block, findings=findings)
 
 
 def __getattr__(name: str) -> Any:

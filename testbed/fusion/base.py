@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from testbed.fusion.analysis.finding import Finding
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
@@ -59,11 +60,14 @@ class EstimateBlock:
         R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
         of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
         guard_hits counts how often a bound held R or Q so far.
+    findings : tuple of Finding, optional
+        What stands against the readings, where `estimate` looked (`testbed.fusion.analysis.verdict`).
     """
 
     rate: FloatArray
     std: FloatArray
     diagnostics: dict[str, FloatArray]
+    findings: tuple[Finding, ...] = ()
 
 
 class Rows(NamedTuple):
@@ -148,6 +152,7 @@ class BlockFilter:
             msg = f"belief: expected two sensors to divide the band between, got {list(sample_rate_hz)}"
             raise ValueError(msg)
         self.schedule = Schedule(sample_rate_hz)
+        self._bias = np.array([[belief[name].bias] for name in self.schedule.sensors])
         self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -204,6 +209,9 @@ class BlockFilter:
         """
         Z = self.schedule.spread(readings)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
+        # Only now: range and repetitions are those of the readings as they come.
+        if self._bias.any():
+            Z -= self._bias
         Z.flags.writeable = False
         return Z, gated
 

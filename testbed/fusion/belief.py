@@ -1,18 +1,21 @@
-"""What a filter believes about its sensors: a transfer function and white noise, apart from what the sensors are."""
+"""What a filter believes about its sensors: dynamics, delay, bias and noise, apart from what the sensors are."""
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import math
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.errors import UnknownNameError
+from testbed.fusion.realisation import Realisation, realise
 from testbed.parts import Part
-from testbed.units import Frequency, Range, RateDensity, RateRandomWalk, RateStd
+from testbed.signals import transfer
+from testbed.units import Duration, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -24,47 +27,29 @@ if TYPE_CHECKING:
 Coefficient = Annotated[float, Field(allow_inf_nan=False)]
 Coefficients = Annotated[tuple[Coefficient, ...], Field(max_length=33)]
 
-_CLOSEST_POLES = 1e-3
 # Readings are rates in rad/s: beyond this, or its inverse, noise referred to the rate has no number.
 _LEAST_GAIN, _HIGHEST_HZ = 1e-30, 1e4
-
-
-@dataclass(frozen=True)
-class Realisation:
-    """State matrices of one sensor: x' = A x + B u, y = C x + D u; A block diagonal, C of ones and zeros.
-
-    Parameters
-    ----------
-    A, B, C : ndarray, shapes (n_state, n_state), (n_state,), (n_state,)
-        Dynamics [1/s], input [1/s] and output [-].
-    D : float
-        Feed-through [-].
-    """
-
-    A: FloatArray
-    B: FloatArray
-    C: FloatArray
-    D: float
-
-    def response(self, freq_hz: FloatArray) -> ComplexArray:
-        """Return C (s I - A)^-1 B + D [-] at s = 2 pi j f, complex, shape (n_freq,), for frequencies [Hz] of that
-        shape.
-        """
-        s = 2j * np.pi * np.asarray(freq_hz, float)[:, None, None]
-        state = np.linalg.solve(
-            s * np.eye(self.B.size) - self.A, np.broadcast_to(self.B[:, None], (s.size, self.B.size, 1))
-        )
-        value: ComplexArray = (state[..., 0] @ self.C) + self.D
-        return value
+# x^5 / 720, the error of a delay's phase x in its approximation, is a milliradian here.
+_PHASE_HOLDS = 0.72**0.2
 
 
 class SensorBelief(Part):
-    """Transfer function from true to indicated rate, and white noise before and behind it.
+    r"""Transfer function from true to indicated rate, and noise before and behind it.
+
+    .. math:: z(t) = (G \omega)(t - \tau) + b + \text{noise}, \quad
+        e^{-\tau s} \approx \frac{1 - \tau s / 2 + (\tau s)^2 / 12}{1 + \tau s / 2 + (\tau s)^2 / 12}
+
+    The filters know the delay by that Padé approximation, which keeps every gain and adds two states. Its phase errs by
+    :math:`(2 \pi f \tau)^5 / 720` rad: `delay_holds_to` is where that is a milliradian.
 
     Parameters
     ----------
     numerator, denominator : tuple of float
-        Coefficients in s [rad/s], highest power first.
+        Coefficients in s [rad/s], highest power first; without a power in the denominator the sensor is static.
+    delay : float
+        Dead time behind the dynamics [s].
+    bias : float
+        Constant of the reading [rad/s]; filters take it off.
     input_noise : float
         Two-sided root density of the noise that passes the dynamics [rad/sqrt(s)].
     output_noise : float
@@ -89,6 +74,8 @@ class SensorBelief(Part):
 
     numerator: Coefficients
     denominator: Coefficients
+    delay: Duration = 0.0
+    bias: Rate = 0.0
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
     noise_knee: Frequency | None = None
@@ -117,9 +104,22 @@ class SensorBelief(Part):
         return float(np.max(np.abs(self.realisation().response(freq))))
 
     @property
-    def n_pole(self) -> int:
-        """Number of poles, and of states of the realisation."""
-        return np.trim_zeros(np.asarray(self.denominator), "f").size - 1
+    def n_state(self) -> int:
+        """Number of states of the realisation: one for each pole, and two for a delay."""
+        return self.polynomials()[1].size - 1
+
+    @property
+    def delay_holds_to(self) -> float:
+        """Up to here the phase of the delay's approximation errs by less than a milliradian [Hz]; inf without one."""
+        return _PHASE_HOLDS / (2.0 * math.pi * self.delay) if self.delay > 0.0 else math.inf
+
+    @property
+    def reading_noise(self) -> float:
+        """Two-sided root density of the white noise on the reading, with the input noise of a static sensor
+        [rad/sqrt(s)].
+        """
+        gain = 0.0 if self.n_state else self.numerator[-1] / self.denominator[-1]
+        return math.hypot(self.output_noise, gain * self.input_noise)
 
     @property
     def sees_constant(self) -> bool:
@@ -154,20 +154,34 @@ class SensorBelief(Part):
         density: FloatArray = power * (self.inner_slow_density(freq_hz) + walk) + self.outer_slow_density(freq_hz)
         return density
 
+    def polynomials(self) -> tuple[FloatArray, FloatArray]:
+        """Return numerator and denominator with the approximation of the delay, highest power first, without leading
+        zeros.
+        """
+        b, a = (np.trim_zeros(np.asarray(one), "f") for one in (self.numerator, self.denominator))
+        if self.delay == 0.0:
+            return b, a
+        lag = np.array([self.delay**2 / 12.0, self.delay / 2.0, 1.0])
+        return np.polymul(b, lag * [1.0, -1.0, 1.0]), np.polymul(a, lag)
+
+    def response(self, freq_hz: FloatArray) -> ComplexArray:
+        """Return the frequency response with the delay as it is [-], complex, shape (n_freq,), for frequencies [Hz] of
+        that shape.
+        """
+        freq = np.asarray(freq_hz, float)
+        value: ComplexArray = transfer(list(self.numerator), list(self.denominator), freq) * np.exp(
+            -2j * np.pi * freq * self.delay
+        )
+        return value
+
     def transfer_function(self) -> control.TransferFunction:
         """Return the noise-free dynamics as a python-control transfer function."""
         import control
 
-        return control.TransferFunction(list(self.numerator), list(self.denominator))
+        return control.TransferFunction(*(one.tolist() for one in self.polynomials()))
 
     def realisation(self) -> Realisation:
-        r"""Return the modal realisation whose states are the parts of the reading, so that all are of the size of the
-        rate.
-
-        .. math:: G(s) = D + \sum_i r_i / (s - p_i)
-
-        A real pole is the state x' = p x + r u; a pair is a rotation. The output is the sum of the states (first ones
-        of pairs).
+        """Return the modal realisation of the dynamics and the delay's approximation.
 
         Returns
         -------
@@ -177,57 +191,9 @@ class SensorBelief(Part):
         Raises
         ------
         ValueError
-            If the transfer function is improper, static or unstable, or poles coincide.
+            If the transfer function is improper or unstable.
         """
-        a, b = _monic(np.asarray(self.denominator), np.asarray(self.numerator))
-        poles = np.roots(a).astype(complex)
-        _check_poles(poles)
-        D = float(b[0])
-        residues = (np.polyval(b - D * a, poles) / np.polyval(np.polyder(a), poles)).astype(complex)
-        return _modal(poles, residues, D)
-
-
-def _monic(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return denominator and numerator of equal length, divided by the leading coefficient of the denominator."""
-    a, b = np.trim_zeros(a, "f"), np.trim_zeros(b, "f")
-    if a.size < 2:
-        msg = f"denominator: expected at least one pole, got coefficients {a.tolist()}"
-        raise ValueError(msg)
-    if b.size > a.size:
-        msg = f"numerator: expected a degree of at most {a.size - 1} (the denominator's), got {b.size - 1}"
-        raise ValueError(msg)
-    return a / a[0], np.concatenate([np.zeros(a.size - b.size), b]) / a[0]
-
-
-def _check_poles(poles: ComplexArray) -> None:
-    if np.any(poles.real > 0.0):
-        msg = f"denominator: expected a stable sensor, got the poles {np.round(poles, 6).tolist()} rad/s"
-        raise ValueError(msg)
-    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
-    if np.any(distance < _CLOSEST_POLES * np.abs(poles)):
-        msg = (
-            f"denominator: expected distinct poles, got {np.round(poles, 6).tolist()} rad/s; the modal form needs them "
-            "apart: move one of the coinciding poles by 1 %"
-        )
-        raise ValueError(msg)
-
-
-def _modal(poles: ComplexArray, residues: ComplexArray, D: float) -> Realisation:
-    """Return the block-diagonal realisation of poles [rad/s] and residues [1/s], slowest pole first."""
-    upper = np.flatnonzero(poles.imag >= 0.0)
-    order = upper[np.argsort(np.abs(poles[upper]))]
-    n = poles.size
-    A, B, C = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    i = 0
-    for pole, residue in zip(poles[order], residues[order], strict=True):
-        C[i] = 1.0
-        A[i, i], B[i] = pole.real, residue.real
-        if pole.imag > 0.0:
-            A[i : i + 2, i : i + 2] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
-            B[i : i + 2] = 2.0 * residue.real, -2.0 * residue.imag
-            i += 1
-        i += 1
-    return Realisation(A, B, C, D)
+        return realise(*self.polynomials())
 
 
 @functools.cache
@@ -260,7 +226,8 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     Parameters
     ----------
     source : str or mapping
-        Name of a shipped belief, or sensor name -> `SensorBelief` or its fields (SI floats or strings with units).
+        Name of a shipped belief, a YAML file of one (a name that ends in ``.yaml``), or sensor name -> `SensorBelief`
+        or its fields (SI floats or strings with units).
 
     Returns
     -------
@@ -271,6 +238,8 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     ------
     UnknownNameError
         If no belief of that name is shipped.
+    ScenarioError
+        If a file cannot be read, or something in it is wrong, with the line.
     ValueError
         If a transfer function or a noise is not acceptable, or the exact belief is asked for: only who knows the
         simulated sensors has that.
@@ -283,12 +252,16 @@ def load_belief(source: str | Mapping[str, Any]) -> dict[str, SensorBelief]:
     >>> load_belief(own)["gyro"].denominator
     (0.01, 1.0)
     """
+    from testbed.fusion.belief_file import is_belief_file, read_belief
+
     if source == "exact":
         msg = (
             "belief: 'exact' is known of simulated instruments only, not of arrays; say of which, such as "
             "belief={'mhd_ars': testbed.belief_of('sx300', exact=True)}"
         )
         raise ValueError(msg)
+    if isinstance(source, str) and is_belief_file(source):
+        return read_belief(Path(source))
     if isinstance(source, str):
         return dict(_shipped(source))
     return {name: SensorBelief.model_validate(value) for name, value in source.items()}

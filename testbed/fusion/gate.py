@@ -52,8 +52,11 @@ def step_std(belief: SensorBelief, sample_rate_hz: float) -> float:
         Of the readings [Hz].
     """
     one = belief.realisation()
+    of_reading = belief.reading_noise**2 * sample_rate_hz
+    if not one.B.size:
+        return math.sqrt(of_reading)
     _, Q = van_loan(one.A, belief.input_noise**2 * np.outer(one.B, one.B), 1.0 / sample_rate_hz)
-    return math.sqrt(float(one.C @ Q @ one.C) + belief.output_noise**2 * sample_rate_hz)
+    return math.sqrt(float(one.C @ Q @ one.C) + of_reading)
 
 
 def most_repeats(std: float, resolution: float | None) -> int:

@@ -132,7 +132,7 @@ def build_model(
     Returns
     -------
     FusionModel
-        With R = output_noise^2 * sample rate [rad^2/s^2].
+        With R = reading_noise^2 * sample rate [rad^2/s^2].
 
     Raises
     ------
@@ -148,12 +148,12 @@ def build_model(
     fastest, strides = common_clock(sample_rate_hz)
     believed = [belief[name] for name in sensors]
     A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
-    owners = np.concatenate([np.full(order, -1), *(np.full(one.n_pole, i) for i, one in enumerate(believed))])
+    owners = np.concatenate([np.full(order, -1), *(np.full(one.n_state, i) for i, one in enumerate(believed))])
     slow_variance = np.zeros(0)
     if coloured:
         A, Qc, H, owners, slow_variance = _with_slow_noise(believed, A, Qc, H, owners)
     F, Q = van_loan(A, Qc, 1.0 / fastest)
-    R = np.array([one.output_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
+    R = np.array([one.reading_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
     P0, still = _start(believed, A, Qc, order, slow_variance, start)
     return FusionModel(sensors, fastest, strides, F, Q, H, R, P0, still, slow_variance.size, owners)
 
@@ -249,7 +249,7 @@ def continuous_model(
         part = slice(at, at + one.B.size)
         A[part, 0] = one.B
         H[i, part], H[i, 0] = one.C, one.D
-        if use_input_noise and sensor.input_noise > 0.0:
+        if use_input_noise and sensor.input_noise > 0.0 and one.B.size:
             if one.D != 0.0:
                 msg = (
                     f"input_noise: expected 0 for a sensor with feed-through {one.D:g}; "

@@ -24,7 +24,7 @@ class BelievedSensor:
     Parameters
     ----------
     belief : SensorBelief
-        Transfer function.
+        Dynamics, delay and bias.
     base_rate_hz : float
         Base clock [Hz].
     ratio : int
@@ -32,8 +32,8 @@ class BelievedSensor:
     """
 
     def __init__(self, belief: SensorBelief, base_rate_hz: float, ratio: int) -> None:
-        self._response = LinearFilter(list(belief.numerator), list(belief.denominator), base_rate_hz)
-        self._ratio, self._done = ratio, 0
+        self._response = LinearFilter(*belief.polynomials(), base_rate_hz)
+        self._bias, self._ratio, self._done = belief.bias, ratio, 0
 
     def process(self, rate: FloatArray) -> FloatArray:
         """Return the readings that fall due in a block of the rate [rad/s], shape (n_reading,)."""
@@ -41,7 +41,7 @@ class BelievedSensor:
             self._response.settle(float(rate[0]))
         readings: FloatArray = self._response.process(rate)[-self._done % self._ratio :: self._ratio]
         self._done += rate.size
-        return readings
+        return readings + self._bias
 
 
 def input_parts(

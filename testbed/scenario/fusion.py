@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import UnknownNameError, quoted
+from testbed.errors import ScenarioError, UnknownNameError, quoted
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.fusion.belief_file import is_belief_file, read_belief
+from testbed.inputs.files import beside_scenario
 from testbed.scenario.beliefs import EXACT, exact_belief
 from testbed.scenario.entries import is_name, kind_of, mapping
 from testbed.scenario.intake import unresolved
@@ -22,6 +25,10 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
 
 _REMEDY = "write 'belief: exact' for the simulator's own response and noise, or what is believed of it"
+_OF_RECORDING = (
+    "name the channels of the recording as the belief does, leave out those that are no sensors, or write what is "
+    "believed of it"
+)
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,8 @@ class Fusion:
         What carries them, which rests at t = 0.
     at_rest : bool
         Whether the filters see that: their first readings are those of t = 0.
+    simulated : bool, optional
+        Whether the sensors are instruments of the simulator, of which it knows what they exactly are.
     """
 
     intake: Intake
@@ -48,6 +57,7 @@ class Fusion:
     data_sheets: Mapping[str, SensorBelief | None]
     turntable: TurntableParameters | None
     at_rest: bool
+    simulated: bool = True
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
@@ -104,7 +114,7 @@ class Fusion:
         """Return what a filter believes of each sensor; None, with the findings noted, if not of all."""
         if written is None:
             return self._of_presets(key)
-        if written == EXACT:
+        if written == EXACT and self.simulated:
             return self._exact(key)
         known = self._named(written, key)
         return None if known is None else self._of_types(known, key)
@@ -135,32 +145,51 @@ class Fusion:
             one = known.get(name, known.get(kind))
             if one is None:
                 words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                self._find(key, f"{words}; {_REMEDY}")
+                self._find(key, f"{words}; {_REMEDY if self.simulated else _OF_RECORDING}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None
 
     def _named(self, written: Any, key: Key) -> Mapping[str, SensorBelief] | None:
         """Return a belief by its name or as written out; None if it is neither, with what was wrong noted."""
+        if isinstance(written, str) and is_belief_file(written):
+            return self._of_file(written, key)
         if isinstance(written, str):
             try:
                 return load_belief(written)
-            except UnknownNameError as error:
+            except ValueError as error:
                 self._find(key, str(error))
                 return None
         if not isinstance(written, dict):
-            self._find(key, f"expected the name of a belief, or a mapping of sensors, got {quoted(written)}")
+            wanted = "the name of a belief, a file of one, or a mapping of sensors"
+            self._find(key, f"expected {wanted}, got {quoted(written)}")
             return None
         read = {str(name): self.intake.validate(SensorBelief, value, (*key, name)) for name, value in written.items()}
         known = {name: _labelled(one) for name, one in read.items() if one is not None}
         return known if len(known) == len(read) else None
 
+    def _of_file(self, written: str, key: Key) -> Mapping[str, SensorBelief] | None:
+        """Return a belief that stands in a file beside the scenario; None if it cannot be used, with the reason
+        noted.
+        """
+        context = {"folder": self.intake.folder, "allow_outside": self.intake.allow_outside}
+        try:
+            return read_belief(beside_scenario(Path(written), context))
+        except ScenarioError as error:
+            self.intake.document.adopt(error)
+        except ValueError as error:
+            self._find(key, str(error))
+        return None
+
 
 def _labelled(one: SensorBelief) -> SensorBelief:
     """Return a belief as written out, which bears the name of a shipped one only if it is that.
 
-    Where the noise of the sensor is off, the scenario itself has taken its resolution away.
+    Where the noise of the sensor is off, the scenario itself has taken its resolution away. The name of a file is that
+    of no shipped one, and what it held stands here.
     """
+    if is_belief_file(one.source):
+        return one
     try:
         known = load_belief(one.source).values()
     except ValueError:

@@ -13,8 +13,9 @@ from testbed.scenario.model import Frame
 from testbed.sensors import SENSORS
 
 _BELIEF = (
-    "What the filter believes of the sensors: the name of a shipped belief, 'exact' for the simulator's own response "
-    "and noise, or a mapping; by default what the data sheets of the sensors' presets support"
+    "What the filter believes of the sensors: the name of a shipped belief, a file of one beside the scenario, 'exact' "
+    "for the simulator's own response and noise, or a mapping; by default what the data sheets of the sensors' presets "
+    "support"
 )
 
 _BOUND = {"type": "string", "pattern": r"^\s*(<=|>=|<|>)\s*[-+0-9.eE]+\s*$"}

@@ -37,6 +37,11 @@ def test_the_papers_protocol_is_a_leak_and_the_honest_one_is_not(written):
     assert leaks[paper3.PIPELINE, "this record"] == 1
     assert leaks[paper3.WITH_SLOPE, "this record"] == 1
     assert all(count == 0 for (_, trained_on), count in leaks.items() if trained_on != "this record")
+    refused = {key: int(row["refused"]) for key, row in rows.items() if row["refused"]}
+    # What does nothing about the drift is no leak, and no compensation.
+    assert {key for key, count in refused.items() if count} == {
+        key for key in refused if key[1] in {"this record", "-"}
+    }
 
 
 @pytest.mark.slow

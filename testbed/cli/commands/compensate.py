@@ -76,12 +76,12 @@ def audit(
     columns: Columns,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("runs/audit"),
 ) -> None:
-    """Find out what a compensation removes and how much true rate survives; status 1 if it leaks."""
+    """Find out what a compensation removes and how much true rate survives; status 1 if it leaks or is none."""
     from testbed.cli.drift import print_audit
     from testbed.drift.page import audit_document
     from testbed.drift.session import audit_model
 
     audited = audit_model(model, source, columns, out, lambda text: output.note(f"{text} ..."))
     output.show({**audit_document(audited), "written": str(out)}, lambda: print_audit(audited, out))
-    if audited.audit.leaks:
+    if not audited.audit.passed:
         raise typer.Exit(MISSED)

@@ -72,9 +72,8 @@ class FixedFilters:
         model, steps = self.model, len(self.K)
         keep = np.eye(model.F.shape[0]) - self.K @ model.H
         parts = []
-        for i, states in enumerate(_states_of(model)):
-            Q = np.zeros_like(model.Q)
-            Q[states, states] = model.Q[states, states]
+        for i in range(len(model.sensors)):
+            Q = np.where(np.outer(model.owners == i, model.owners == i), model.Q, 0.0)
             column = self.K[..., i]
             W = keep @ Q @ _t(keep) + model.R[i] * column[..., :, None] * column[..., None, :]
             M = keep @ model.F
@@ -258,14 +257,6 @@ def filters_from(model: FusionModel, q: FloatArray, Q: FloatArray, prior: FloatA
 
 def _t(matrix: FloatArray) -> FloatArray:
     return np.swapaxes(matrix, -1, -2)
-
-
-def _states_of(model: FusionModel) -> list[slice]:
-    """Return the states of each sensor: they follow the signal's in the order of the sensors, H reading each one's
-    first.
-    """
-    firsts = [int(np.flatnonzero(np.arange(row.size) * (row != 0.0))[0]) for row in model.H]
-    return [slice(a, b) for a, b in zip(firsts, [*firsts[1:], model.F.shape[0]], strict=True)]
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from testbed.fusion.two_paths.design import (
     BAND_ORDER,
     HIGH_HZ,
     LOW_HZ,
-    apart,
     at,
     band_end,
     best_crossover,
@@ -36,8 +35,9 @@ from testbed.units import Frequency, Range
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from testbed.fusion.belief import Realisation, SensorBelief
+    from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
+    from testbed.fusion.realisation import Realisation
     from testbed.parts import Part
     from testbed.signals import ComplexArray, FloatArray
 
@@ -125,6 +125,7 @@ class TwoPaths(BlockFilter):
         super().__init__(belief, sample_rate_hz, parameters)
         self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
         self.model.check_cycle()
+        _refuse_delay({name: belief[name] for name in self.model.sensors})
         self._slow, self._fast = _roles(belief, self.model)
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
@@ -249,6 +250,13 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     return slow, fast
 
 
+def _refuse_delay(belief: Mapping[str, SensorBelief]) -> None:
+    late = [name for name, one in belief.items() if one.delay > 0.0]
+    if late:
+        msg = f"belief: expected sensors without a delay, got {late}: no inverse makes up for one; `kalman` takes it"
+        raise ValueError(msg)
+
+
 def _as_they_come(slow: SensorBelief, freq_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:
     """Return readings over a sine, held for their interval: half of it late; shape of the frequencies [-].
 
@@ -304,9 +312,8 @@ def _best_alone(
     """
 
     def band_of(bandwidth_hz: float) -> tuple[FloatArray, FloatArray]:
-        excess = slow.n_pole - np.trim_zeros(np.array(slow.numerator), "f").size + 1
-        poles = BAND_ORDER + excess + 1
-        return low_pass(BAND_ORDER, apart(2.0 * math.pi * bandwidth_hz, poles, slow), poles)
+        excess = slow.n_state - np.trim_zeros(np.array(slow.numerator), "f").size + 1
+        return low_pass(BAND_ORDER, 2.0 * math.pi * bandwidth_hz, BAND_ORDER + excess + 1)
 
     def error(log_f: float) -> float:
         band = band_of(math.exp(log_f))

@@ -22,15 +22,13 @@ from testbed.fusion.belief import SensorBelief
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from testbed.fusion.belief import Realisation
+    from testbed.fusion.realisation import Realisation
     from testbed.signals import ComplexArray, FloatArray
 
 # Order of the band end: the rate through three integrators, as in the optimum of most signals.
 BAND_ORDER = 3
 # Where the two sensors are compared, and the crossover is looked for.
 LOW_HZ, HIGH_HZ = 1e-5, 1e3
-# Closer than this over the corner [-], twice what a belief takes, a pole and a zero are moved apart.
-_MEETS = 2e-3
 
 
 def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray, FloatArray]:
@@ -139,28 +137,7 @@ def band_end(slow: SensorBelief, fast: SensorBelief, bandwidth: float) -> tuple[
         Corner of B [rad/s].
     """
     excess = max(len(one.denominator) - _numerator(one).size for one in (slow, fast))
-    poles = BAND_ORDER + max(excess - 1, 0)
-    return low_pass(BAND_ORDER, apart(bandwidth, poles, slow, fast), poles)
-
-
-def apart(w: float, poles: int, *sensors: SensorBelief) -> float:
-    """Return a corner [rad/s], moved up by 1 % as often as a pole of its low-pass all but meets a zero of a sensor.
-
-    Zeros become poles of the inverse, which no modal form holds apart from others that close.
-
-    Parameters
-    ----------
-    w : float
-        Corner of Butterworth poles [rad/s].
-    poles : int
-        Their number [-].
-    *sensors : SensorBelief
-        Those that are inverted.
-    """
-    zeros = np.concatenate([np.roots(_numerator(sensor)) for sensor in sensors])[:, None]
-    while np.any(np.abs(w * buttap(poles)[1] - zeros) < _MEETS * w):
-        w *= 1.01
-    return w
+    return low_pass(BAND_ORDER, bandwidth, BAND_ORDER + max(excess - 1, 0))
 
 
 def _numerator(sensor: SensorBelief) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import block_diag, expm
 
-from testbed.fusion.belief import Realisation
+from testbed.fusion.realisation import Realisation
 from testbed.fusion.two_paths.design import inverted
 
 if TYPE_CHECKING:
