@@ -213,7 +213,8 @@ class TwoPaths(BlockFilter):
             self.order, best_crossover(slow, fast, self.order, freq_hz, float(lag.of(np.array([freq_hz]))[0]))
         )
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    # Its paths step at regular steps only.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
 
 
