@@ -108,12 +108,12 @@ def shaped_loop(
         return math.log(max(np.max(density / bound), whole / least))
 
     bounds = math.log(2.0 * math.pi * SHAPED_FROM_HZ), math.log(2.0 * math.pi * SHAPED_TO_HZ)
-    first = minimize_scalar(lambda log_k: excess(_loop([log_k])), bounds=bounds, method="bounded").x
-    k = math.exp(first)
-    begin = np.array([first, math.log(_LEAK * k), math.log(_SLOPE * k**2)])
+    first = float(minimize_scalar(lambda log_k: excess(_loop([log_k])), bounds=bounds, method="bounded").x)
+    logs = [first, first + math.log(_LEAK), 2.0 * first + math.log(_SLOPE)]
     for _ in range(2):  # a simplex that has collapsed on an edge of the maximum starts anew from there
-        begin = minimize(lambda logs: excess(_loop(logs)), begin, method="Nelder-Mead", options=_SEARCH).x
-    return _loop(begin)
+        found = minimize(lambda x: excess(_loop(x)), logs, method="Nelder-Mead", options=_SEARCH)  # type: ignore[call-overload]
+        logs = found.x.tolist()
+    return _loop(logs)
 
 
 def _loop(logs: FloatArray | list[float]) -> Loop:
