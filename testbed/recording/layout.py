@@ -77,7 +77,11 @@ def blueprint(
             [
                 _plot(f"Rate, {span} [rad/s]", rates, zoom),
                 _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
-                _plot("Truth and estimates [rad/s]", truth_and_filters, (0.0, duration)),
+                _plot(
+                    f"{'Truth and estimates' if '/truth/rate' in rates else 'Estimates'} [rad/s]",
+                    truth_and_filters,
+                    (0.0, duration),
+                ),
             ]
         ),
     ]
