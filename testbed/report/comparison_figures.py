@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from testbed.report.figures import Unit
     from testbed.runs.metrics import FloorDensity
 
-_B = (0, (4.0, 1.6))
+_STYLES: tuple[tuple[str, Any], ...] = (("A", "-"), ("B", (0, (4.0, 1.6))))
 
 
 def errors_beside(
@@ -108,7 +108,7 @@ def spectra_beside(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 4.6))
         axes = figure.subplots()
-        for digest, floor, style in zip(digests, floors, ("-", _B), strict=True):
+        for digest, floor, (_, style) in zip(digests, floors, _STYLES, strict=True):
             for name in names:
                 trace = digest.filter_errors[name]
                 root = unit[1] * np.degrees(np.sqrt(trace.density))
@@ -130,9 +130,6 @@ def spectra_beside(
         ]
         if any(floors):
             handles.append(Line2D([], [], color=INK, linewidth=1.1, label="noise floor"))
-        handles += [
-            Line2D([], [], color=INK, linewidth=1.5, linestyle=style, label=side)
-            for side, style in zip("AB", ("-", _B), strict=True)
-        ]
+        handles += [Line2D([], [], color=INK, linewidth=1.5, linestyle=style, label=side) for side, style in _STYLES]
         arrange(figure, handles)
     return figure
