@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _LEAST_COHERENCE = 0.5
 
 
-def cross_check(lineup: Lineup, belief: Mapping[str, SensorBelief], settle: float) -> list[dict[str, Any]]:
+def sensor_agreement(lineup: Lineup, belief: Mapping[str, SensorBelief], settle: float) -> list[dict[str, Any]]:
     """Return what each pair of sensors shares: coherence by band, and the ratio of the slower to the faster over that
     of their beliefs, 1 and 0 deg if these hold.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from testbed.fusion.belief import load_belief
-from testbed.playback.cross import cross_check
+from testbed.playback.cross import sensor_agreement
 from testbed.playback.lineup import line_up
 from testbed.playback.reel import Reel
 
@@ -35,7 +35,7 @@ def test_a_gain_shows_over_the_belief_and_the_belief_s_own_lag_does_not(start):
     """
     t, late = np.arange(40_000) / FAST, 1e-9 * start + np.arange(10_000) / SLOW
     fast, slow = Reel("fast", lines(t)[0], 0, FAST), Reel("slow", lines(late, 1.1)[1], start, SLOW)
-    (pair,) = cross_check(line_up([fast, slow], None, "x"), BELIEF, 1.0)
+    (pair,) = sensor_agreement(line_up([fast, slow], None, "x"), BELIEF, 1.0)
     assert (pair["first"], pair["second"]) == ("fast", "slow")
     assert [band["high_hz"] for band in pair["bands"]] == [1.0, 10.0, 100.0, 200.0]
     for band in pair["bands"][1:]:
@@ -46,6 +46,8 @@ def test_a_gain_shows_over_the_belief_and_the_belief_s_own_lag_does_not(start):
 
 def test_what_is_not_shared_has_no_gain(rng):
     one, other = (1e-3 * rng.standard_normal(n) for n in (40_000, 10_000))
-    (pair,) = cross_check(line_up([Reel("fast", one, 0, FAST), Reel("slow", other, 0, SLOW)], None, "x"), BELIEF, 0.0)
+    (pair,) = sensor_agreement(
+        line_up([Reel("fast", one, 0, FAST), Reel("slow", other, 0, SLOW)], None, "x"), BELIEF, 0.0
+    )
     assert pair["bands"][-1]["coherence"] < 0.05
     assert pair["bands"][-1]["gain_over_belief"] is None
