@@ -61,7 +61,8 @@ def olmd_kpca(record: GyroRecord, *, seed: int = 0) -> FloatArray:
     slow: FloatArray = functions[list(groups.drift)].sum(axis=0)
     if not groups.mixed:
         return slow
-    return slow + kernel_components(functions[list(groups.mixed)], seed=seed).sum(axis=0)
+    mixed: FloatArray = kernel_components(functions[list(groups.mixed)], seed=seed).sum(axis=0)
+    return slow + mixed
 
 
 def ceemdan_lwt(record: GyroRecord, *, seed: int = 0, trials: int = 100, threads: int | None = None) -> FloatArray:

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
+from testbed.allan import allan_deviation
 from testbed.compensation.paper3 import PaperOptions
+from testbed.compensation.training import block_means
 from testbed.reproduce import paper3
+from testbed.units import DEG_H
 
 SHOWN = (
     "bias_instability_deg_h",
@@ -120,6 +123,28 @@ def test_the_page_has_the_numbers_of_the_table(written):
         table = line[line.index("</tr>") :]
     assert text.count("<svg") == 2
     assert all((out / link).is_file() for link in re.findall(r'href="(audit_[^"]+)"', text))
+
+
+@pytest.mark.slow
+def test_the_figures_stand_beside_their_numbers(written):
+    """Figure 10 is the record, the modes of figure 11 have its variance, figures 13 and 14 are what was audited."""
+    out, lines, _ = written
+    tables = {n: np.genfromtxt(out / f"figure_{n}.csv", delimiter=",", names=True) for n in range(10, 15)}
+    for n in tables:
+        assert (out / f"figure_{n}.svg").read_text().count("</svg>") == 1
+        assert (out / f"figure_{n}.png").read_bytes().startswith(b"\x89PNG")
+        assert any(line.startswith(f"figure_{n}: ") for line in lines)
+        assert f'href="figure_{n}.svg"' in (out / "paper3.html").read_text()
+    record = paper3.cycle("paper", 1, 0.1).record
+    means = block_means(record.rate, 10) / DEG_H
+    np.testing.assert_allclose(tables[10]["rate_deg_h"], means, rtol=1e-8)
+    np.testing.assert_allclose(tables[13]["original"], means - means.mean(), atol=1e-8)
+    curve = allan_deviation(record.rate, 0.1)
+    np.testing.assert_allclose(tables[14]["tau_s"], curve.tau, rtol=1e-8)
+    np.testing.assert_allclose(tables[14]["original"], curve.deviation / DEG_H, rtol=1e-8)
+    assert list(tables[11]["group"]) == sorted(tables[11]["group"])
+    # The residual is in figure 11 and has no entropy.
+    assert tables[12].size == tables[11].size - 1
 
 
 def test_a_cycle_has_the_drift_of_the_paper_and_the_earth_on_top():

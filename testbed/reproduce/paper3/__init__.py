@@ -25,7 +25,7 @@ from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
-from testbed.reproduce.paper3.figures import Decomposed, write_figures
+from testbed.reproduce.paper3.figures import Decomposed, write_figures_10_to_14
 from testbed.reproduce.paper3.page import page
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
@@ -250,14 +250,14 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     yield from _printed(rows, found, seeds)
     yield ""
     yield "figures of the first seed (SVG and PNG, the numbers in CSV)"
-    yield from write_figures(Decomposed.of(first[ORIGINAL].thermal, protocol.options, 1), first, out)
+    yield from write_figures_10_to_14(Decomposed.of(first[ORIGINAL].thermal, protocol.options, 1), first, out)
 
 
 def _title(case: Contender) -> str:
     return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
-_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
+_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None, "[": None, "]": None})
 
 
 def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,7 @@ class Decomposed:
         return next(name for name in GROUPS if mode in getattr(self.groups, name))
 
 
-def write_figures(found: Decomposed, audited: Mapping[str, Audited], out: Path) -> Iterator[str]:
+def write_figures_10_to_14(found: Decomposed, audited: Mapping[str, Audited], out: Path) -> Iterator[str]:
     """Write every figure as SVG and PNG beside its table, and yield a line for each.
 
     Parameters
@@ -116,10 +117,10 @@ def write_figures(found: Decomposed, audited: Mapping[str, Audited], out: Path) 
         ("figure_10", "record and oven", day(thermal), draw_day(day(thermal))),
         ("figure_11", "modes", mode_table(found), draw_modes(found)),
         ("figure_12", "entropy of the modes", entropies(found), draw_entropies(entropies(found), found)),
-        ("figure_13", "compensated rates", rates(shown), draw_rates(rates(shown))),
+        ("figure_13", "compensated rates", rates(shown), draw_compensated(rates(shown))),
         ("figure_14", "Allan deviations", deviations(shown), draw_deviations(deviations(shown))),
     ):
-        write_text(out / f"{name}.csv", csv_text(table))
+        write_text(out / f"{name}.csv", csv_text({_column(head): values for head, values in table.items()}))
         save(figure, out, name)
         yield f"{name}: {what}"
 
@@ -230,7 +231,9 @@ def draw_entropies(table: Table, found: Decomposed) -> Figure:
         rows = [k + 1 for k in getattr(found.groups, name) if k + 1 <= table["mode"].size]
         if rows:
             axes.axvspan(rows[0] - 0.5, rows[-1] + 0.5, color=color, alpha=0.10, linewidth=0)
-            axes.text(0.5 * (rows[0] + rows[-1]), 0.03, name, ha="center", fontsize=6.5, color=color)
+            middle = 0.5 * (rows[0] + rows[-1])
+            place = axes.get_xaxis_transform()
+            axes.text(middle, 1.01, name, ha="center", fontsize=6.5, color=color, transform=place)
     axes.axhline(0.5, color=INK, linewidth=0.7, linestyle=LIMIT)
     axes.set(xlabel="mode", ylabel="entropy [-]", xlim=(0.5, table["mode"].size + 0.5))
     axes.set_ylim(bottom=0.0)
@@ -240,7 +243,7 @@ def draw_entropies(table: Table, found: Decomposed) -> Figure:
 
 
 @mpl.rc_context(PRINT)
-def draw_rates(table: Table) -> Figure:
+def draw_compensated(table: Table) -> Figure:
     """Draw figure 13; argument as from `rates`."""
     names = [name for name in table if name != "time_h"]
     figure, axes = panels(0.75 * len(names) + 0.5, len(names))
@@ -268,6 +271,11 @@ def draw_deviations(table: Table) -> Figure:
     axes.set(xlabel="averaging time [s]", ylabel="Allan deviation [deg/h]")
     legend(figure, [key(name, color=styles[name][0], linestyle=styles[name][1]) for name in names], 2)
     return figure
+
+
+def _column(name: str) -> str:
+    """Return a name as the head of a column: no blanks, commas or quotes."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower().replace("'", "")).strip("_")
 
 
 def _in_hours(axes: Any, hours: FloatArray) -> None:
