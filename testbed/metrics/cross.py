@@ -72,12 +72,11 @@ def cross_bands(first: FloatArray, second: FloatArray, sample_rate_hz: float, ex
     n_segment = min(first.size // _SEGMENTS, _LONGEST)
     if n_segment < _FEWEST:
         return []
-    how = {"fs": sample_rate_hz, "nperseg": n_segment, "detrend": "constant"}
     step, highest = sample_rate_hz / n_segment, 0.5 * _HIGHEST * sample_rate_hz
     other = _bridged(second)
     like = _through(_bridged(first), sample_rate_hz, expected, (step, highest))
-    freq, both = csd(like, other, **how)
-    alone, own = welch(like, **how)[1], welch(other, **how)[1]
+    freq, both = csd(like, other, fs=sample_rate_hz, nperseg=n_segment)
+    alone, own = (welch(x, fs=sample_rate_hz, nperseg=n_segment)[1] for x in (like, other))
     bands = []
     for low, high in pairwise([_FIRST * step, *_decades(_FIRST * step, highest)]):
         part = (freq >= low) & (freq < high)
