@@ -84,6 +84,8 @@ if TYPE_CHECKING:
     from testbed.logs import read_log
     from testbed.models.motions import list_motions
     from testbed.notebook import Run, open_run
+    from testbed.playback.export import export
+    from testbed.playback.replay import replay
     from testbed.scenario.beliefs import belief_of
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
@@ -100,6 +102,7 @@ __all__ = [
     "belief_of",
     "estimate",
     "evaluate",
+    "export",
     "line_of_sight",
     "list_filters",
     "list_motions",
@@ -110,6 +113,7 @@ __all__ = [
     "open_run",
     "open_sweep",
     "read_log",
+    "replay",
     "run",
     "sweep",
 ]
@@ -125,6 +129,7 @@ _LAZY = {
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
+    "export": "testbed.playback.export",
     "line_of_sight": "testbed.chain.sight",
     "open_sweep": "testbed.campaigns.sweep",
     "sweep": "testbed.campaigns.sweep",
@@ -136,6 +141,7 @@ _LAZY = {
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
     "read_log": "testbed.logs",
+    "replay": "testbed.playback.replay",
     "run": "testbed.chain.runner",
 }
 

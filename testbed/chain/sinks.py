@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.chain.pipeline import Chain
-    from testbed.runs.block import RunBlock
+    from testbed.runs.block import PlayedBlock, RunBlock
     from testbed.scenario.model import Scenario
 
 
 class Sink(Protocol):
     """A file in the making."""
 
-    def write(self, block: RunBlock) -> None:
+    def write(self, block: RunBlock | PlayedBlock) -> None:
         """Add a block."""
 
     def close(self) -> None:

@@ -216,6 +216,7 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
         table=table,
         largest=one.largest,
         factor=one.factor,
+        start_ns=one.offset_ns,
     )
 
 

@@ -88,14 +88,20 @@ class Consistency:
     .. math:: \mathrm{NEES} = \langle (\hat x - x)^2 / \sigma^2 \rangle
 
     of the rate. Errors of one run hang together in time, by the slowest mode of the filter, so no bound is given for
-    it; the innovations of a consistent filter are white, and have one.
+    it; the innovations of a consistent filter are white, and have one. Without a truth the innovations alone decide.
+
+    Parameters
+    ----------
+    known : bool, optional
+        Whether there is a truth.
 
     References
     ----------
     Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), section 5.4.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, known: bool = True) -> None:
+        self._known = known
         self._n = 0
         self._square = 0.0
         self._sensors: dict[str, Whiteness] = {}
@@ -137,17 +143,14 @@ class Consistency:
 
     def _verdict(self, nees: float | None) -> str | None:
         """Return in one word whether the claims hold within FACTOR: the error decides, then the innovations."""
-        if nees is None:
+        if nees is None and self._known:
             return None
-        if nees > FACTOR:
+        if nees is not None and nees > FACTOR:
             return "optimistic"
-        if nees < 1.0 / FACTOR:
+        if nees is not None and nees < 1.0 / FACTOR:
             return "pessimistic"
-        for sums in self._sensors.values():
-            nis = sums.nis()
-            if nis is None:
-                continue
-            low, high = sums.nis_bounds()
+        judged = [(nis, sums.nis_bounds()) for sums in self._sensors.values() if (nis := sums.nis()) is not None]
+        for nis, (low, high) in judged:
             if not low / FACTOR <= nis <= high * FACTOR:
                 return "innovations too large" if nis > 1.0 else "innovations too small"
-        return "consistent"
+        return "consistent" if judged or self._known else None

@@ -44,7 +44,7 @@ def blueprint(
     sensors: Sequence[str],
     filters: Sequence[str],
     channels: Sequence[str],
-    model: mujoco.MjModel,
+    model: mujoco.MjModel | None,
     clock: Clock,
 ) -> rrb.Blueprint:
     """Return the layout for the signals that the recording has.
@@ -55,19 +55,19 @@ def blueprint(
         Paths of the scalar signals that are to be seen.
     sensors, filters, channels : sequence of str
         Names of the sensors, of the filters and of the sensors that have a velocity profile.
-    model : mujoco.MjModel
-        The bodies, for the place of the camera.
+    model : mujoco.MjModel, optional
+        The bodies, for the place of the camera; a recording that is replayed has none.
     clock : Clock
         Length of the run and the window recorded sample by sample.
     """
     window, duration = clock.detail, clock.n_time / clock.sample_rate_hz
     rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
     rates = [rate for rate in rates if rate in entities] + [f"/fusion/{n}/rate" for n in filters]
-    truth_and_filters = ["/truth/rate", *(f"/fusion/{n}/rate" for n in filters)]
+    truth_and_filters = [rate for rate in rates if rate.startswith(("/truth", "/fusion"))]
     least = FEWEST / clock.sample_rate_hz
     zoom, around = (window[0], min(window[0] + max(SHOWN, least), duration)), max(ZOOM, 0.5 * least)
     span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
-    left: list[rrb.View | rrb.Container] = [_turntable(model)]
+    left: list[rrb.View | rrb.Container] = [] if model is None else [_turntable(model)]
     if channels:
         probes = [(f"At three heights, {n} [rad/s]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
         left.append(_tabs([*map(_profile, channels), *(_plot(*probe, zoom) for probe in probes)]))
@@ -81,8 +81,8 @@ def blueprint(
             ]
         ),
     ]
-    if filters:
-        errors = [f"/fusion/{n}/error" for n in filters]
+    errors = [entity for entity in entities if entity.endswith("/error") and entity.startswith("/fusion/")]
+    if errors:
         right.append(
             _tabs(
                 [
@@ -116,12 +116,9 @@ def blueprint(
     if diagnostics := _diagnostics(entities, sensors, duration):
         right.append(_tabs(diagnostics))
     shares = {"row_shares": [3, 2, 2][: len(left)]} if len(left) > 1 else {}
+    plots = rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4, 4][: len(right)])
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(*left, **shares),
-            rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4, 4][: len(right)]),
-            column_shares=[2, 3],
-        ),
+        rrb.Horizontal(rrb.Vertical(*left, **shares), plots, column_shares=[2, 3]) if left else plots,
         rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed"),
         collapse_panels=True,
         auto_layout=False,

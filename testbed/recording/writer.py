@@ -20,12 +20,14 @@ from testbed.recording.layout import blueprint
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
+from testbed.runs.block import PlayedBlock, clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from types import TracebackType
 
     import mujoco
+    from numpy.typing import NDArray
 
     from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
@@ -58,14 +60,16 @@ class RecordingWriter:
         Rate of each sensor [Hz], a divisor of the base rate.
     fusion_names : sequence of str
         Filters, whose estimates come at the rate of the fastest sensor.
-    model : mujoco.MjModel
-        Bodies of the turntable.
+    model : mujoco.MjModel, optional
+        Bodies of the turntable; a recording that is replayed has none.
     settle : float
         Start of the part that is judged [s].
     detail : tuple of float, optional
         Start and end of the window recorded sample by sample [s]; by default the 2 s after `settle`.
     pose_stride : int
         Base samples between poses and between profiles.
+    times_ns : mapping of str to ndarray, shape (n_time,), optional
+        Stamps [ns] of ``base`` and of every sensor, where they are no multiples of one step.
 
     Raises
     ------
@@ -82,13 +86,14 @@ class RecordingWriter:
         n_time: int,
         sensor_rates: Mapping[str, float],
         fusion_names: Sequence[str],
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | None,
         settle: float,
         detail: tuple[float, float] | None = None,
         pose_stride: int = 400,
+        times_ns: Mapping[str, NDArray[np.int64]] | None = None,
     ) -> None:
         self._path = Path(path)
-        self._model, self._pose_stride = model, pose_stride
+        self._model, self._pose_stride, self._times = model, pose_stride, times_ns
         self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
         self._fusion_names = list(fusion_names)
         self._fusion_stride = min(self._strides.values(), default=1)
@@ -101,36 +106,50 @@ class RecordingWriter:
         self._stream.send_recording_name(scenario_name)
         self._recording = Recording(self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)))
         self._signals: dict[str, Signal] = {}
-        self._world = World(self._recording, model, {name: self._colors[f"sensors/{name}"] for name in sensor_rates})
+        bodies = {name: self._colors[f"sensors/{name}"] for name in sensor_rates}
+        self._world = None if model is None else World(self._recording, model, bodies)
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
         self._moved = False
         self._open = True
 
-    def write(self, block: RunBlock) -> None:
+    def write(self, block: RunBlock | PlayedBlock) -> None:
         """Add the next block of the run."""
+        if isinstance(block, PlayedBlock):
+            self._write_rates(block.sensors, block.reference)
+            self._write_estimates(block, block.reference)
+        else:
+            self._write_run(block)
+
+    def _write_run(self, block: RunBlock) -> None:
         truth = block.truth.rate
         self._moved |= bool(np.any(block.command.rate))
         self._add("/commanded/rate", block.command.rate[: truth.size], 1, "commanded [rad/s]", "commanded", 1.0)
-        self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
-        for name, readings in block.sensors.items():
-            key = f"sensors/{name}"
-            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+        self._write_rates(block.sensors, truth)
         for name, temperature in block.temperatures.items():
             key, drift = f"sensors/{name}", block.drifts[name]
             self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
             self._add(f"/truth/{name}/drift", drift, 1, f"{name} [rad/s]", key, detailed=False)
-        reference = truth[-block.start % self._fusion_stride :: self._fusion_stride]
+        self._write_estimates(block, truth[-block.start % self._fusion_stride :: self._fusion_stride])
+        self._write_sights(block)
+        self._write_poses(block)
+
+    def _write_rates(self, sensors: Mapping[str, FloatArray], truth: FloatArray | None) -> None:
+        if truth is not None:
+            self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
+        for name, readings in sensors.items():
+            key = f"sensors/{name}"
+            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+
+    def _write_estimates(self, block: RunBlock | PlayedBlock, reference: FloatArray | None) -> None:
         for name, estimate in block.fusion.items():
-            key = f"fusion/{name}"
-            stride = self._fusion_stride
+            key, stride = f"fusion/{name}", self._fusion_stride
             self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
-            self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
+            if reference is not None:
+                self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
-        self._write_sights(block)
-        self._write_poses(block)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -149,7 +168,8 @@ class RecordingWriter:
             channel.finish()
         if self._target is not None:
             self._target.finish()
-        self._world.finish()
+        if self._world is not None:
+            self._world.finish()
         self._stream.send_blueprint(self._blueprint())
         try:
             # Only flush reports a full disk; disconnect is silent about it.
@@ -228,6 +248,7 @@ class RecordingWriter:
                 width=width,
                 detailed=detailed,
                 gaps=gaps,
+                times_ns=None if self._times is None else self._times[clock_of(key)],
             )
         self._signals[entity].write(values)
 
@@ -246,6 +267,7 @@ class RecordingWriter:
     def _write_poses(self, block: RunBlock) -> None:
         first = -block.start % self._pose_stride
         index = np.arange(block.start + first, block.start + block.truth.rate.size, self._pose_stride)
+        assert self._world is not None
         self._world.write(index, block.truth.poses, block.truth.angle[first :: self._pose_stride])
         for name, (heights, profiles) in block.profiles.items():
             if name not in self._channels:

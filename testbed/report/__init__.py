@@ -12,7 +12,7 @@ from testbed.report.budget import band_rows, budget_figure, line_error, line_opt
 from testbed.report.digest import Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.pointing import inside_rows, sight_budget_figure, sight_curves_figure, sight_rows
-from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
+from testbed.report.words import METRICS, RATIOS, claims, finding_text, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
@@ -106,6 +106,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         ratios=RATIOS,
         over_bound=over_bound,
         honesty=honesty,
+        finding_text=finding_text,
         line_error=line_error,
         metrics=metrics,
         names=_shown_metrics(metrics),
@@ -129,10 +130,13 @@ def _of_pointing(metric: str) -> bool:
 
 
 def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
-    """Return the columns of the error table: those in which some source has a value, and the error."""
+    """Return the columns of the error table: those in which some source has a value, and the error where there may be
+    one.
+    """
     sources = [*metrics.sensors.values(), *metrics.fusion.values()]
     known = {key for key in METRICS if any(getattr(source, RATIOS.get(key, key)) is not None for source in sources)}
-    return {key: name for key, name in METRICS.items() if key in {"rmse_deg_s", *known}}
+    always = set() if "mean_deg_s" in known else {"rmse_deg_s"}
+    return {key: name for key, name in METRICS.items() if key in always | known}
 
 
 def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
@@ -150,7 +154,7 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
         drawn["sight_budget"] = sight_budget_figure(metrics.pointing)
         drawn["sight_curves"] = sight_curves_figure(metrics.pointing, colors)
     drawn["rates"] = rates_figure(digest, colors, unit)
-    if digest.filter_errors:
+    if digest.filter_errors and digest.has_truth:
         drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:
         drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density, unit)

@@ -67,6 +67,8 @@ class ThermalTrace:
 class Digest:
     """Traces of a run by name: ``commanded``, ``truth`` and every sensor and filter; `thermal` of those with a
     thermometer.
+
+    Of a recording without a reference there is no truth and no error: the densities are those of the rates themselves.
     """
 
     duration_s: float
@@ -77,6 +79,11 @@ class Digest:
     sensor_errors: dict[str, ErrorTrace]
     filter_errors: dict[str, ErrorTrace]
     thermal: dict[str, ThermalTrace] = field(default_factory=dict)
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether there is something that the errors are against."""
+        return "truth" in self.rates
 
 
 def zoom_window(metrics: RunMetrics, still: float = 1.0) -> tuple[float, float]:
@@ -125,10 +132,14 @@ def digest_run(run: RunRecord) -> Digest:
     ScenarioError
         If the run lacks a signal that its metrics name, or its units or time base are wrong.
     """
-    metrics, truth = run.metrics, _column(run, "truth", "rate")
-    zoom = zoom_window(metrics, max(1.0, FEWEST / truth.sample_rate_hz))
+    metrics = run.metrics
+    tops = ["truth"] if metrics.replay else ["commanded", "truth"]
+    tops = [group for group in tops if group in run.groups or not metrics.replay]
+    truth = _column(run, "truth", "rate") if "truth" in tops else None
+    fastest = max((one.sample_rate_hz for one in run.groups.values()), default=1.0)
+    zoom = zoom_window(metrics, max(1.0, FEWEST / fastest))
     rates = {}
-    for group in ("commanded", "truth"):
+    for group in tops:
         signal = _column(run, group, "rate")
         trace = _rate_trace(signal, zoom)
         for first in range(0, signal.n_time, BLOCK):
@@ -198,22 +209,25 @@ def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
     trace.zoom.process(first, rate)
 
 
-def _follow(run: RunRecord, group: str, truth: _Column, zoom: tuple[float, float]) -> tuple[RateTrace, ErrorTrace]:
-    """Read one sensor or filter beside the truth."""
+def _follow(
+    run: RunRecord, group: str, truth: _Column | None, zoom: tuple[float, float]
+) -> tuple[RateTrace, ErrorTrace]:
+    """Read one sensor or filter beside the truth, if there is one."""
     signal = _column(run, group, "rate")
     std = _column(run, group, "std") if group.startswith("fusion/") else None
-    stride, fs = _stride(run, group, signal, truth), signal.sample_rate_hz
+    against = _Against(run, group, signal, truth)
+    fs = signal.sample_rate_hz
     settle = min(int(np.ceil(run.metrics.settle_s * fs - 1e-6)), signal.n_time)
     n_segment = segment_length(signal.n_time - settle)
     welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
     trace = _rate_trace(signal, zoom)
     whole, band = Envelope(0, signal.n_time, fs, N_BINS), Envelope(0, signal.n_time, fs, N_BINS)
     n_inside, n_judged = 0, 0
-    n_block = max(1, BLOCK // stride)
+    n_block = max(1, BLOCK // against.stride)
     for first in range(0, signal.n_time, n_block):
         stop = min(first + n_block, signal.n_time)
         rate = signal.read(first, stop)
-        error = rate - truth.read(first * stride, (stop - 1) * stride + 1)[::stride]
+        error = against.error(first, rate)
         settled = max(settle - first, 0)
         _add_rate(trace, first, rate)
         whole.process(first, error)
@@ -222,6 +236,8 @@ def _follow(run: RunRecord, group: str, truth: _Column, zoom: tuple[float, float
         if std is not None:
             sigma = std.read(first, stop)
             band.process(first, sigma)
+            if truth is None:
+                continue
             inside, judged = _count_inside(error[settled:], sigma[settled:])
             n_inside, n_judged = n_inside + inside, n_judged + judged
     freq_hz, density = _plotted(welch)
@@ -234,6 +250,35 @@ def _follow(run: RunRecord, group: str, truth: _Column, zoom: tuple[float, float
         n_segments=0 if welch is None else welch.n_segments,
         band_rms=_band_rms(welch, run.metrics),
     )
+
+
+class _Against:
+    """What a signal is compared with: the truth at its samples; without one nothing."""
+
+    def __init__(self, run: RunRecord, group: str, signal: _Column, truth: _Column | None) -> None:
+        # The reference of a recording is on the clock of the fastest sensor; a slower one may have its own.
+        self._own = truth is not None and signal.signals.stamped
+        self._truth, self._signal = truth, signal
+        self.stride = 1 if truth is None or self._own else _stride(run, group, signal, truth)
+
+    def error(self, first: int, rate: FloatArray) -> FloatArray:
+        """Return what a block of the signal from sample `first` on is off by [rad/s]."""
+        if self._truth is None:
+            return rate
+        if not self._own:
+            stop = first + rate.size
+            return rate - self._truth.read(first * self.stride, (stop - 1) * self.stride + 1)[:: self.stride]
+        return rate - self._at(np.asarray(self._signal.signals.read("time", first, first + rate.size)))
+
+    def _at(self, times: FloatArray) -> FloatArray:
+        """Return the truth at other instants [s], by straight lines between its samples."""
+        assert self._truth is not None
+        fs = self._truth.sample_rate_hz
+        margin = 2 + int(1e-3 * self._truth.n_time)
+        first = max(int(times[0] * fs) - margin, 0)
+        stop = min(int(times[-1] * fs) + margin, self._truth.n_time)
+        known = np.asarray(self._truth.signals.read("time", first, stop))
+        return np.interp(times, known, self._truth.read(first, stop), left=np.nan, right=np.nan)
 
 
 def _bridged(error: FloatArray) -> FloatArray:

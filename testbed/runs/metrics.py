@@ -73,7 +73,8 @@ class ConsistencyMetrics(Entry):
 class SourceMetrics(Entry):
     """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
     a filter's is from, `start` what it knew of its start, `gated` how many readings its front part struck out, by
-    sensor, `caution` where it does not hold.
+    sensor, `caution` where it does not hold. Of a recording without reference `mean_deg_s` and `spread_deg_s` are what
+    is read or estimated.
     """
 
     belief: str | None = None
@@ -87,6 +88,8 @@ class SourceMetrics(Entry):
     missing: int | None = None
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
+    mean_deg_s: float | None = None
+    spread_deg_s: float | None = None
     floor_rmse_deg_s: float | None = None
     prior_floor_rmse_deg_s: float | None = None
     optimum_rmse_deg_s: float | None = None
@@ -216,8 +219,52 @@ class PartSetup(Entry):
     differs: list[dict[str, str | None]] = []
 
 
+class ChannelMetrics(Entry):
+    """A channel of a replayed recording: where it stands, how it was read, its clock [Hz, s], how many of its samples
+    were lost, and how many were `dropped` since the filters had no use for them.
+    """
+
+    column: str
+    file: str
+    unit: str | None = None
+    rate_hz: float
+    start_s: float
+    n_time: int
+    missing: int = 0
+    dropped: int = 0
+    notes: list[str] = []
+
+
+class ReplayMetrics(Entry):
+    """What was replayed: the recording, its channels, whether it has a reference, and how its clocks go together."""
+
+    log: str
+    format: str
+    reference: bool
+    clock: str
+    channels: dict[str, ChannelMetrics]
+    start_ns: int | None = None
+    notes: list[str] = []
+
+
+class FindingMetrics(Entry):
+    """What the verdict found of a sensor: the value with its interval, what to do, and whether it was put right."""
+
+    kind: str
+    sensor: str
+    value: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    unit: str = ""
+    remedy: str = ""
+    fixed: bool = False
+
+
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
+
+    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it;
+    `scenario` is its name, and there is no `seed`.
 
     Examples
     --------
@@ -228,7 +275,7 @@ class RunMetrics(Entry):
     """
 
     scenario: str
-    seed: int
+    seed: int | None
     duration_s: float = Field(gt=0)
     settle_s: float = Field(ge=0)
     bandwidth_hz: float | None = None
@@ -240,6 +287,9 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     pointing: dict[str, PointingMetrics] = {}
     expectations: list[Expectation] = []
+    replay: ReplayMetrics | None = None
+    findings: list[FindingMetrics] = []
+    undecided: list[str] = []
     versions: dict[str, Any] = {}
     setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []

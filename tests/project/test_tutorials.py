@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import testbed
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
 FOLDER = ROOT / "docs" / "reference" / "run_folder.md"
-PAGES = [*TUTORIALS, ROOT / "docs" / "howto.md", FOLDER]
+PAGES = [*TUTORIALS, ROOT / "docs" / "howto.md", ROOT / "docs" / "replay.md", FOLDER]
 SHORT = {
     "name": "short",
     "duration": "0.4 s",
@@ -49,7 +50,7 @@ def test_what_it_tells_to_type_works(page, tmp_path, monkeypatch, capsys):
 
 def commands(text):
     for line in text.splitlines():
-        word, *arguments = line.split()
+        word, *arguments = shlex.split(line)
         # What installs is tried by whoever clones the repository.
         if word != "make":
             assert word == "testbed"
