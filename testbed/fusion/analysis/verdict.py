@@ -95,6 +95,22 @@ def verdict(
     return Verdict(tuple(_once(findings)), tuple(undecided))
 
 
+def even_stamps(readings: Mapping[str, ArrayLike], sample_rate_hz: Mapping[str, float]) -> dict[str, NDArray[np.int64]]:
+    """Return the stamps of readings that are even and begin together [ns], shape (n_sensor_samples,) each.
+
+    Parameters
+    ----------
+    readings : mapping of str to array_like, shape (n_sensor_samples,)
+        Of each sensor.
+    sample_rate_hz : mapping of str to float
+        Rate of each [Hz].
+    """
+    return {
+        name: np.rint(np.arange(np.size(values)) * (1e9 / sample_rate_hz[name])).astype(np.int64)
+        for name, values in readings.items()
+    }
+
+
 def _traces(
     readings: Mapping[str, ArrayLike], time_ns: Mapping[str, NDArray[np.int64]], belief: Mapping[str, SensorBelief]
 ) -> dict[str, Trace]:

@@ -9,6 +9,8 @@ import math
 import numpy as np
 import pytest
 
+from testbed.errors import VerdictWarning
+from testbed.fusion import estimate
 from testbed.fusion.analysis.remedy import remedied
 from testbed.fusion.analysis.verdict import verdict
 from testbed.fusion.belief import load_belief
@@ -217,3 +219,15 @@ def test_readings_stay_as_they_are(moving):
     before = {name: z.copy() for name, z in readings.items()}
     verdict(readings, time_ns, EQ39)
     assert all(np.array_equal(before[name], z) for name, z in readings.items())
+
+
+def test_estimate_warns_of_each_finding_and_keeps_them(moving):
+    readings, _ = moving
+    assert estimate("kalman", readings, sample_rate_hz=RATES).findings == ()
+    turned = readings | {"mems_gyro": -readings["mems_gyro"]}
+    with pytest.warns(VerdictWarning, match="mems_gyro: sign -1") as said:
+        found = estimate("kalman", turned, sample_rate_hz=RATES)
+    assert [(one.kind, one.sensor) for one in found.findings] == [("sign", "mems_gyro")]
+    # It points at who called.
+    assert [one.filename for one in said] == [__file__]
+    assert estimate("kalman", turned, sample_rate_hz=RATES, verdict=False).findings == ()
