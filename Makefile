@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run view test lint docs linkcheck bench baseline crash changes readme pictures clean fuzz
+.PHONY: run view test lint docs linkcheck bench baseline crash changes commands pictures clean fuzz
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -55,17 +55,18 @@ fuzz: .venv/installed-test
 bench: .venv/installed-test
 	$(BIN)/python benchmarks/promises.py
 
-# Rewrites the stored error-against-frequency curves; say in the commit why they moved.
+# The standard campaign and its short form as they are now become the baseline: make baseline REASON="what moved them".
 baseline: .venv/installed-test
-	$(BIN)/python -m tests.regression.error_vs_frequency
+	$(BIN)/testbed regress --short --update "$(REASON)"
+	$(BIN)/testbed regress --update "$(REASON)"
 
 # Kills at 200 random moments of a run, a report and a training, and disks of 20 sizes: half an hour.
 crash: .venv/installed-test
 	TESTBED_CRASH_KILLS=200 TESTBED_CRASH_SIZES=20 $(BIN)/python -m pytest -s tests/crash
 
-# The table of commands in README.md.
-readme: .venv/installed-test
-	$(BIN)/python -m tests.project.readme
+# The table of commands in docs/commands.md.
+commands: .venv/installed-test
+	$(BIN)/python -m tests.project.commands
 
 # The picture of the rooms in docs/architecture.md.
 pictures: .venv/installed-test

@@ -13,6 +13,10 @@ from numpydoc.docscrape import NumpyDocString
 from typer.cli import get_docs_for_click
 
 import testbed
+from testbed.campaigns.regression.history import latest, read_history
+from testbed.campaigns.regression.leaderboard import standings
+from testbed.campaigns.regression.page import entries_of
+from testbed.campaigns.regression.standard import AXES, STANDARD
 from testbed.cli.app import app
 from testbed.scenario.model import Frame
 from testbed.scenario.schema import schema
@@ -36,6 +40,7 @@ def write_pages(folder: Path) -> None:
         "keys.md": keys(),
         "presets.md": presets(),
         "api.md": api(),
+        "standings.md": leaderboard(),
     }
     for name, text in pages.items():
         path = folder / name
@@ -47,6 +52,30 @@ def commands() -> str:
     """Return the reference of the commands, by typer's own generator."""
     group = typer.main.get_command(app)
     return get_docs_for_click(obj=group, ctx=typer.Context(group), name="testbed", title="Commands")
+
+
+def leaderboard() -> str:
+    """Return the filters in their order, from the baseline of the standard campaign, and its entries."""
+    history = read_history()
+    rows = latest(history, STANDARD)
+    order = standings(rows, {row["source"]: row["cost"] for row in rows if row["cost"] is not None})
+    parts = [
+        "# Leaderboard: the table\n",
+        "What the columns mean, how a filter enters and how the table is cited: [leaderboard](../../leaderboard.md).\n",
+        "| filter | error over optimum | 95 % | worst | where | claims hold | error over claim | time over kalman's |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in order:
+        claims = f"{100 * one.honest:.0f} % | {one.error_over_claim:.3g}"
+        cost = "" if one.cost is None else f"{one.cost:.2g}"
+        error = f"{one.over_optimum:.3g} | {one.lower:.3g} to {one.upper:.3g} | {one.worst:.3g} | {one.worst_case}"
+        parts.append(f"| `{one.name}` | {error} | {claims} | {cost} |")
+    cases, seeds = {tuple(row[axis] for axis in AXES) for row in rows}, {row["seed"] for row in rows}
+    parts += ["", f"{len(cases)} cases, {len(seeds)} seeds each.\n", "## Entries\n"]
+    parts += [
+        f"{place}. {version}: {reason}" for place, (_, version, reason) in enumerate(entries_of(history, STANDARD), 1)
+    ]
+    return "\n".join(parts) + "\n"
 
 
 def presets() -> str:

@@ -104,7 +104,8 @@ def cycle(name: str, seed: int, fog: Fog = FOG) -> Cycle:
     rate, surroundings = np.full(temperature.size, EARTH), Surroundings(temperature=temperature)
     stage = fog.start(1.0, seed, "fog")
     reading = stage.process_in(rate, surroundings)
-    clean = fog.model_copy(update={"noise": False}).start(1.0, 0, "fog").process_in(rate, surroundings)
+    # With its seed: coefficients that scatter are those of the cycle.
+    clean = fog.model_copy(update={"noise": False}).start(1.0, seed, "fog").process_in(rate, surroundings)
     return Cycle(GyroRecord(reading, stage.temperature, 1.0), clean - EARTH, reading - clean)
 
 

@@ -85,6 +85,8 @@ if TYPE_CHECKING:
     from testbed.logs import read_log
     from testbed.models.motions import list_motions
     from testbed.notebook import Run, open_run
+    from testbed.playback.export import export
+    from testbed.playback.replay import replay
     from testbed.scenario.beliefs import belief_of
     from testbed.scenario.loader import load_scenario
     from testbed.scenario.model import Scenario
@@ -101,6 +103,7 @@ __all__ = [
     "belief_of",
     "estimate",
     "evaluate",
+    "export",
     "identify_sensors",
     "line_of_sight",
     "list_filters",
@@ -112,6 +115,7 @@ __all__ = [
     "open_run",
     "open_sweep",
     "read_log",
+    "replay",
     "run",
     "sweep",
 ]
@@ -127,6 +131,7 @@ _LAZY = {
     "belief_of": "testbed.scenario.beliefs",
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
+    "export": "testbed.playback.export",
     "identify_sensors": "testbed.identification.session",
     "line_of_sight": "testbed.chain.sight",
     "open_sweep": "testbed.campaigns.sweep",
@@ -139,6 +144,7 @@ _LAZY = {
     "load_scenario": "testbed.scenario.loader",
     "open_run": "testbed.notebook",
     "read_log": "testbed.logs",
+    "replay": "testbed.playback.replay",
     "run": "testbed.chain.runner",
 }
 

@@ -77,6 +77,10 @@ class ScenarioError(ValueError):
         return type(self), (self.problems,)
 
 
+class VerdictWarning(UserWarning):
+    """Readings contradict each other, or what is believed of their sensors; says which, and what to do about it."""
+
+
 class RunError(RuntimeError):
     """The run failed after it started (diverged, saturated, disk full); says how far it got."""
 

@@ -77,7 +77,7 @@ def judged(
 ) -> tuple[float, float]:
     """Return error and claim of a filter from `begin` to `end` [s], root mean squares [deg/s]."""
     parameters = {"belief": "identified", **parameters}
-    block = estimate(name, readings, sample_rate_hz=RATES, **parameters)
+    block = estimate(name, readings, sample_rate_hz=RATES, verdict=False, **parameters)
     part = slice(round(begin * FS), round(end * FS))
     return rms((block.rate - rate)[part]) / DEG, rms(block.std[part]) / DEG
 

@@ -42,6 +42,10 @@ ROOMS = {
         *("scenario", "models", "sensors", "fusion", "pointing", "runs"),
         *("judging", "report", "recording", "notebook"),
     },
+    "playback": {
+        *("logs", "metrics", "fusion", "runs", "scenario"),
+        *("report", "recording", "notebook", "chain"),
+    },
     "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs", "pages"},
     "design": {"scenario", "sensors", "fusion", "models", "pointing", "pages"},
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
@@ -161,7 +165,8 @@ def test_a_public_name_has_one_meaning():
 
 
 PUBLIC = {
-    "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError read_log",
+    "testbed": "run load_scenario open_run Scenario Run Problem ScenarioError RunError UnknownNameError read_log "
+    "replay export",
     "testbed.cli": "main",
     "testbed.models.mhd_channel": "MhdChannel Fluid one_mode_response",
     "testbed.models.turntable": "Turntable TurntableParameters Mounting",

@@ -32,6 +32,7 @@ EXAMPLES = [
     "testbed.chain.sight",
     "testbed.errors",
     "testbed.fusion",
+    "testbed.fusion.analysis.verdict",
     "testbed.fusion.belief",
     "testbed.logs.reader",
     "testbed.models.mhd_channel.channel",

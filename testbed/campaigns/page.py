@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from typing import TYPE_CHECKING
 
@@ -57,6 +56,6 @@ class Page:
             found=found,
             n_done=seeds,
             n_runs=len(study.cases) * len(study.seeds),
-            repeat=f"testbed sweep {shlex.quote(study.file)} --only",
+            repeat=f"{study.command} --only",
         )
         write_text(self._folder / PAGE, text)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from testbed.signals import FloatArray
 
@@ -121,12 +121,24 @@ def rank(errors: Mapping[str, FloatArray]) -> list[Comparison]:
 
 def _corrected(found: list[Comparison]) -> list[Comparison]:
     """Return the comparisons with Holm's correction of all but the best one."""
-    others = sorted(range(1, len(found)), key=lambda i: found[i].p_value)
-    values, largest = {}, 0.0
-    for rank_of, i in enumerate(others):
-        largest = max(largest, min(1.0, (len(others) - rank_of) * found[i].p_value))
-        values[i] = largest
+    corrected = [1.0, *holm([one.p_value for one in found[1:]])]
     return [
-        Comparison(one.name, one.over_best, one.lower, one.upper, values.get(i, 1.0), one.n_seed)
-        for i, one in enumerate(found)
+        Comparison(one.name, one.over_best, one.lower, one.upper, p, one.n_seed)
+        for one, p in zip(found, corrected, strict=True)
     ]
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Return chances with Holm's correction for their number, in the same order.
+
+    Parameters
+    ----------
+    p_values : sequence of float
+        Of each comparison alone.
+    """
+    order = sorted(range(len(p_values)), key=lambda i: p_values[i])
+    corrected, largest = [1.0] * len(p_values), 0.0
+    for place, i in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - place) * p_values[i]))
+        corrected[i] = largest
+    return corrected

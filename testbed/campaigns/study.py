@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,7 +118,9 @@ class Variation:
 
 @dataclass(frozen=True)
 class Study:
-    """A validated study: `cases` in order, and `seeds`, of which a case with `precision` may need only the first."""
+    """A validated study: `cases` in order, and `seeds`, of which a case with `precision` may need only the first;
+    `command` is what plays it.
+    """
 
     name: str
     description: str
@@ -126,6 +129,7 @@ class Study:
     cases: tuple[Variation, ...]
     seeds: tuple[int, ...]
     precision: float | None = None
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return what the study is, as its folder keeps it: two that differ in it do not continue each other."""
@@ -172,6 +176,7 @@ def load_study(path: str | Path, *, plugins: Iterable[str] = ()) -> Study:
         tuple(cases),
         tuple(range(first, first + count)),
         precision,
+        f"testbed sweep {shlex.quote(str(path))}",
     )
 
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from testbed.chain.pointing import LinesOfSight
 from testbed.document import Document
 from testbed.errors import Problem, ScenarioError
@@ -15,8 +17,8 @@ from testbed.pointing.parameters import PointingParameters
 from testbed.runs.block import first_due
 from testbed.runs.metrics import PointingMetrics
 from testbed.runs.results import RunRecord
-from testbed.scenario.loader import load_scenario
 from testbed.scenario.pointing import check_pointing
+from testbed.scenario.recorded import RecordedScenario, load_described
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
@@ -53,7 +55,8 @@ def line_of_sight(
     Raises
     ------
     ScenarioError
-        If the folder is no run, has no pointing and none is given, or what is given does not fit the run.
+        If the folder is no run, has no pointing and none is given, or what is given does not fit the run; of a replayed
+        recording, if it has no reference throughout, or clocks of no whole ratio.
 
     Examples
     --------
@@ -62,7 +65,9 @@ def line_of_sight(
     testbed.errors.ScenarioError: nowhere: expected a run folder, but nowhere/scenario.yaml, ... is missing
     """
     run = RunRecord.open(run_dir)
-    scenario = load_scenario(Path(run_dir) / "scenario.yaml", plugins=plugins)
+    scenario = load_described(Path(run_dir) / "scenario.yaml", plugins=plugins)
+    if isinstance(scenario, RecordedScenario):
+        _check_recording(run, str(run_dir))
     if pointing is not None:
         scenario = _with_pointing(scenario, pointing)
     if scenario.pointing is None:
@@ -77,6 +82,22 @@ def line_of_sight(
         for name, block in stage.process(truth, felt, readings, estimates).items():
             judges[name].process(block, truth)
     return {name: PointingMetrics.model_validate(judge.result()) for name, judge in judges.items()}
+
+
+def _check_recording(run: RunRecord, folder: str) -> None:
+    """Refuse a recording of which the angle that is to be held is not known, or not at whole steps."""
+    if "rate" not in run.truth:
+        message = "has no reference, so the angle that the mirror has to hold is not known: replay it with one"
+        raise ScenarioError([Problem(message, file=folder)])
+    if run.truth.stamped:
+        raise ScenarioError([Problem("expected clocks in whole ratios for a line of sight, got stamps", file=folder)])
+    for start in range(0, run.truth.n_time, BLOCK):
+        lost = np.isnan(run.truth.read("rate", start, start + BLOCK))
+        if lost.any():
+            at = (start + int(np.argmax(lost))) / run.truth.sample_rate_hz
+            raise ScenarioError(
+                [Problem(f"the reference is not known from {at:.6g} s on: cut the record", file=folder)]
+            )
 
 
 def _with_pointing(scenario: Scenario, given: str | Path | Mapping[str, Any]) -> Scenario:
@@ -105,7 +126,9 @@ def _blocks(
             values: FloatArray = group[name].read("rate", first, last)
             return values
 
-        felt = {name: run.truth.read(f"{name}_rate", start, stop) for name in scenario.sensors}
+        # What a sensor of a recording feels is not known apart from the reference.
+        own = {name: f"{name}_rate" if f"{name}_rate" in run.truth else "rate" for name in scenario.sensors}
+        felt = {name: run.truth.read(signal, start, stop) for name, signal in own.items()}
         readings = {name: due(run.sensors, name) for name in scenario.sensors}
         estimates = {name: due(run.fusion, name) for name in scenario.fusion}
         yield run.truth.read("rate", start, stop), felt, readings, estimates

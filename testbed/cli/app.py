@@ -15,8 +15,10 @@ from testbed.cli.commands import (
     identify,
     log,
     parts,
+    playback,
     pointing,
     psd,
+    regress,
     reproduce,
     scenario,
     sweep,
@@ -38,11 +40,14 @@ app.command()(folder.view)
 app.command()(folder.report)
 app.command()(allan.allan)
 app.command()(psd.psd)
+app.command()(playback.replay)
+app.command()(playback.export)
 app.command()(identify.identify)
 app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)
 app.command()(sweep.sweep)
+app.command()(regress.regress)
 app.add_typer(compensate.app)
 app.add_typer(log.app)
 

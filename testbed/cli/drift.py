@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from testbed.cli.console import ruled, terminal
-from testbed.drift.summary import LETTERS, audit_summary
+from testbed.drift.summary import LETTERS, audit_summary, start_summary
 from testbed.pages.numbers import significant
 
 if TYPE_CHECKING:
@@ -23,7 +23,17 @@ def print_training(found: Mapping[str, Any]) -> None:
 
 def print_application(found: Mapping[str, Any]) -> None:
     """Print how far a model had to be extrapolated, and where the compensated record is."""
-    _print(f"{found['extrapolated']:.2%} of the samples outside the trained range", found)
+    _print(f"{found['extrapolated']:.2%} of the samples outside the trained range{_elsewhere(found)}", found)
+
+
+def _elsewhere(found: Mapping[str, Any]) -> str:
+    """Return what is to be said of a start at another temperature, empty if nothing is."""
+    if not found["starts_elsewhere"]:
+        return ""
+    return (
+        f"; it starts {found['start_distance_k']:.1f} K from the nearest start of a training cycle: "
+        "its first hours are compensated worse"
+    )
 
 
 def _print(line: str, found: Mapping[str, Any]) -> None:
@@ -61,16 +71,26 @@ def print_audit(audited: Audited, folder: Path) -> None:
         "least gain of a slow true rate": "least_gain_in_drift_band",
         "gain of a step": "step_gain",
         "gain of Earth-rate steps": "earth_rate_gain",
+        "gain of a rate that follows temperature": "temperature_rate_gain",
     }
     for label, key in shown.items():
         if figures[key] is not None:
             console.print(f"{label}: {significant(figures[key], 4)}")
     if audited.extrapolated is not None:
-        console.print(f"outside the trained range: {audited.extrapolated:.2%} of the samples")
+        where = _elsewhere(start_summary(audited.start_distance))
+        console.print(f"outside the trained range: {audited.extrapolated:.2%} of the samples{where}", soft_wrap=True)
     for leak in figures["leaks"]:
         console.print(f"LEAK: {leak}", style="red", soft_wrap=True)
-    console.print("verdict: " + ("no leak found" if figures["passed"] else "a leak; do not believe this result"))
+    for excess in figures["excess"]:
+        console.print(f"NO COMPENSATION: {excess}", style="red", soft_wrap=True)
+    console.print(f"verdict: {_verdict(figures)}")
     console.print(f"wrote {folder / 'audit.html'}", soft_wrap=True)
+
+
+def _verdict(figures: Mapping[str, Any]) -> str:
+    if figures["leaks"]:
+        return "a leak; do not believe this result"
+    return "no leak found" if figures["passed"] else "no leak found, and no compensation; do not use this result"
 
 
 def _row(quality: dict[str, object]) -> list[str]:

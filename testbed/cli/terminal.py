@@ -70,7 +70,8 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
 
 def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:
     """Yield what the filters knew of the start, and what their front part struck out."""
-    for start, words in (("rest", "knew that the table rests at t = 0"), ("unknown", "knew nothing of the start")):
+    rests = "the table rests" if metrics.replay is None else "all rests"
+    for start, words in (("rest", f"knew that {rests} at t = 0"), ("unknown", "knew nothing of the start")):
         if names := [name for name, source in metrics.fusion.items() if source.start == start]:
             yield f"start: {', '.join(names)} {words}"
     for name, source in metrics.fusion.items():
@@ -84,7 +85,7 @@ def _print_errors(console: Console, headings: Sequence[str], rows: Sequence[list
     """Print the columns that have a value, a line under each kind of source, names in the colour of their signal."""
     cells = [row for kind in rows for row in kind]
     table = Table()
-    kept = [i for i in range(len(headings)) if i < 2 or any(row[i] != NOTHING for row in cells)]
+    kept = [0, *([i for i in range(1, len(headings)) if any(row[i] != NOTHING for row in cells)] or [1])]
     for i in kept:
         table.add_column(headings[i], justify="right" if i else "left", no_wrap=True)
     for kind in rows:
@@ -105,12 +106,16 @@ def _print_claims(console: Console, fusion: Mapping[str, SourceMetrics]) -> None
     """Print the verdict on each filter's claims about itself."""
     claims = {name: source.consistency for name, source in fusion.items() if source.consistency is not None}
     words = [
-        f"{name} {claim.verdict} (NEES {number(claim.nees)})"
+        f"{name} {claim.verdict}" + ("" if claim.nees is None else f" (NEES {number(claim.nees)})")
         for name, claim in claims.items()
         if claim.verdict is not None
     ]
     if words:
-        meaning = "NEES: mean of error squared over the variance that the filter claims, 1 if the claim holds"
+        meaning = (
+            "by the innovations alone, since there is no reference"
+            if all(claim.nees is None for claim in claims.values())
+            else "NEES: mean of error squared over the variance that the filter claims, 1 if the claim holds"
+        )
         console.print(f"claims: {', '.join(words)}; {meaning}", soft_wrap=True)
 
 

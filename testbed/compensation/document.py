@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 if TYPE_CHECKING:
     from typing import Self
 
-FORMAT, VERSION = "testbed drift model", 2
+FORMAT, VERSION = "testbed drift model", 3
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 _MOST_FEATURES = 64
@@ -88,11 +88,12 @@ class ModelDocument(_Closed):
     """A drift model as it stands in its file; SI, see `testbed.compensation.model_only.DriftModel`."""
 
     format: Literal["testbed drift model"]
-    version: Literal[2]
+    version: Literal[3]
     method: Literal["gradient", "lssvm", "polynomial", "process"]
     sample_rate_hz: Annotated[float, _between(1e-6, 1e6)]
     mean_rate: Annotated[float, _between(-1e3, 1e3)]
     blocked_error: Annotated[float, _between(0.0, 1e3)]
+    starts: Annotated[list[Annotated[float, _between(1.0, 2000.0)]], Field(min_length=1, max_length=1000)]
     features: FeaturesDocument
     scaling: ScalingDocument
     machine: Machine

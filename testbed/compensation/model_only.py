@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 _MACHINES: dict[str, type[Lssvm | Polynomial]] = {"lssvm": Lssvm, "polynomial": Polynomial}
 # A drift beyond it is that of no gyro: 5.7 deg/s.
 MOST_DRIFT = 0.1
+# Kelvin between the first reading and the nearest start of a training cycle, within the widest dead band of an optical
+# mount (12 K): 10 K cost at most a quarter more error over the first four hours, 20 K a half, 40 K the double
+# (benchmarks/fog_audit.py).
+START_MARGIN = 10.0
 # What each method is: the kind of machine, how it is fitted, and the features unless told otherwise.
 METHODS: dict[str, tuple[str, Fit, Features]] = {
     "gradient": ("polynomial", training.fit_coloured, Features()),
@@ -74,6 +78,8 @@ class DriftModel:
     blocked_error : float
         Rms of the blocked cross-validation error of the row means, their noise included; for `gradient` and `process`
         of what is new in each row [rad/s].
+    starts : tuple of float
+        First temperature of each training cycle: every feature, and the gyro's own hysteresis, begins there [K].
     features : Features
         What is formed of the temperature.
     scaling : Scaling
@@ -86,6 +92,7 @@ class DriftModel:
     sample_rate_hz: float
     mean_rate: float
     blocked_error: float
+    starts: tuple[float, ...]
     features: Features
     scaling: Scaling
     machine: Lssvm | Polynomial
@@ -109,6 +116,16 @@ class DriftModel:
             Readings at any sample rate.
         """
         return self.start(record.sample_rate_hz).process(record.rate, record.temperature)
+
+    def start_distance(self, record: GyroRecord) -> float:
+        """Return how far a record's first temperature is from the nearest start of a training cycle [K].
+
+        Parameters
+        ----------
+        record : GyroRecord
+            To be compensated; over `START_MARGIN` its first hours are compensated worse.
+        """
+        return min(abs(float(record.temperature[0]) - start) for start in self.starts)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain lists and numbers for JSON, which keeps every bit; with its own digest."""
@@ -141,6 +158,7 @@ class DriftModel:
             found.sample_rate_hz,
             found.mean_rate,
             found.blocked_error,
+            tuple(found.starts),
             Features(**features),
             Scaling(**_arrays(found.scaling.model_dump())),
             _MACHINES[METHODS[found.method][0]](**_arrays(found.machine.model_dump())),
@@ -237,7 +255,8 @@ def train(
     chosen = own if features is None else features
     rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT if kind == "lssvm" else None)
     fitted, error = fit(rows, seed)
-    return DriftModel(method, cycles[0].sample_rate_hz, rows.mean_rate, error, chosen, rows.scaling, fitted)
+    starts = tuple(float(cycle.temperature[0]) for cycle in cycles)
+    return DriftModel(method, cycles[0].sample_rate_hz, rows.mean_rate, error, starts, chosen, rows.scaling, fitted)
 
 
 def _plain(value: Any) -> Any:

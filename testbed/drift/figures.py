@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from testbed.allan.fit import term_variance
-from testbed.drift.leak import DRIFT_PERIOD, LEAST_GAIN
+from testbed.drift.findings import DRIFT_PERIOD, LEAST_GAIN
 from testbed.drift.quality import timed_means
 from testbed.pages.palette import FILTERS, SENSORS, TRUTH
 from testbed.pages.svg import INK, STYLE
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from testbed.compensation.record import GyroRecord
-    from testbed.drift.leak import Audit
+    from testbed.drift.findings import Audit
     from testbed.drift.quality import Quality
     from testbed.signals import FloatArray
 
@@ -151,12 +151,16 @@ def gain_figure(audit: Audit) -> Figure:
                 fine, 1.0 / (1.0 + (1.0 / fine / corner) ** 4), color=color, linestyle=line, label="equal low-pass"
             )
         axes.plot(period, gain, "o-", color=FILTERS[0], markersize=4, label="sines")
-        steps = {"step": (audit.step_gain, (0, (5, 2))), "Earth-rate steps": (audit.earth_gain, (0, (1.2, 1.6)))}
+        steps: dict[str, tuple[float | None, Any]] = {
+            "step": (audit.step_gain, (0, (5, 2))),
+            "Earth-rate steps": (audit.earth_gain, (0, (1.2, 1.6))),
+            "rate that follows T": (audit.heat_gain, (0, (7, 1.2, 1.5, 1.2))),
+        }
         for label, (share, line) in steps.items():
             if share is not None:
                 axes.axhline(share, color=INK, linewidth=0.9, linestyle=line, label=label)
         axes.set(xscale="log", xlabel="period of the true rate [s]", ylabel="gain [-]", ylim=(0.0, 1.19))
         axes.set_xlim(period[0] / 1.2, period[-1] * 1.2)
         axes.grid(visible=True)
-        axes.legend(loc="upper left", ncols=4, fontsize=8)
+        axes.legend(loc="upper left", ncols=5, fontsize=8)
     return figure

@@ -124,6 +124,21 @@ def earth_turns(t: FloatArray, latitude: float = np.pi / 4.0) -> FloatArray:
     return rate
 
 
+def heat_rate(temperature: FloatArray, std: float) -> FloatArray:
+    """Return a rate [rad/s], shape (n_time,), proportional to the temperature about its mean.
+
+    Parameters
+    ----------
+    temperature : ndarray, shape (n_time,)
+        One that moves [K].
+    std : float
+        Standard deviation of the rate [rad/s].
+    """
+    heat = temperature - temperature.mean()
+    rate: FloatArray = std / heat.std() * heat
+    return rate
+
+
 def survivor(compensate: Compensate, record: GyroRecord, plain: FloatArray, injected: FloatArray) -> FloatArray:
     """Return what comes out of `injected` [rad/s], shape (n_time,): the output with it minus the output without.
 

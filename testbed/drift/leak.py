@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from testbed.allan import allan_deviation
+from testbed.drift.findings import DRIFT_PERIOD, Audit
 from testbed.drift.injection import (
     PERIODS,
     cutoff,
     earth_turns,
+    heat_rate,
     line_gains,
     pattern_gain,
     sines,
@@ -24,99 +25,16 @@ from testbed.signals import sample_times
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from testbed.compensation.record import GyroRecord
     from testbed.drift.injection import Compensate, LineGain
-    from testbed.drift.quality import Quality
     from testbed.signals import FloatArray
 
-# Periods from which on a rate could pass for thermal drift: the shortest thermal lag of a coil.
-DRIFT_PERIOD = 900.0  # s
-LEAST_GAIN = 0.9
-LEAST_ORACLE_RATIO = 0.7
 # Fast sines are small against the noise of a reading (0.047 deg/h at 1 Hz), so that a method that adapts to the noise
-# does not take them for it; slow ones and the step are about the size of the drift.
+# does not take them for it; slow ones, the step and what follows temperature are about the size of the drift.
 FAST_SINE, SLOW_SINE, STEP = 0.01 * DEG_H, 0.05 * DEG_H, 0.05 * DEG_H  # rad/s
-
-
-@dataclass(frozen=True)
-class Audit:
-    """What a compensation does to one record.
-
-    Parameters
-    ----------
-    before, after : Quality
-        Of the record and of the compensated one.
-    low_passed : Quality or None
-        Of the record through a plain low-pass of the compensation's bandwidth; None if the compensation does not cut
-        the band.
-    oracle : Quality or None
-        Of the record less its true drift, which only a simulation knows.
-    gains : tuple of LineGain
-        What survives of sines, by rising period.
-    step_gain, earth_gain : float or None
-        What survives of a step and of Earth-rate steps [-]; None if the compensation fails on them.
-    bandwidth_hz : float or None
-        Where short periods begin to be lost [Hz]; None if they are not.
-    drift_reduction : float or None
-        Std of the 100 s means of the true drift over those of what is left of it [-]; None where the drift is not
-        known.
-    seen : bool, optional
-        Whether this very record was trained on before: a frozen model passes every known rate, whatever it learned of
-        the record's own.
-    """
-
-    before: Quality
-    after: Quality
-    low_passed: Quality | None
-    oracle: Quality | None
-    gains: tuple[LineGain, ...]
-    step_gain: float | None
-    earth_gain: float | None
-    bandwidth_hz: float | None
-    drift_reduction: float | None
-    seen: bool = False
-
-    @property
-    def oracle_ratio(self) -> float | None:
-        """Allan deviation at 1 h over that of the oracle [-]; None where either is not known."""
-        if self.oracle is None or self.oracle.hour_deviation is None or self.after.hour_deviation is None:
-            return None
-        return self.after.hour_deviation / self.oracle.hour_deviation
-
-    @property
-    def block_std_ratio(self) -> float | None:
-        """Std of the 100 s means over that of the oracle [-]; None where that is not known or zero."""
-        if self.oracle is None or not self.oracle.block_std > 0.0:
-            return None
-        return self.after.block_std / self.oracle.block_std
-
-    @property
-    def leaks(self) -> tuple[str, ...]:
-        """Why the result cannot be believed; empty if nothing speaks against it."""
-        seen = ("the model was trained on this very record: audit it on another cycle",) if self.seen else ()
-        return (*seen, *self._lost_rates(), *self._better_than_possible())
-
-    def _lost_rates(self) -> Iterator[str]:
-        slow = {
-            f"a true rate with a period of {line.period:g} s": line.gain
-            for line in self.gains
-            if line.period >= DRIFT_PERIOD
-        }
-        for name, gain in {**slow, "a step": self.step_gain, "Earth-rate steps": self.earth_gain}.items():
-            if gain is None:
-                yield f"with {name} added the compensation fails"
-            elif gain < LEAST_GAIN:
-                yield f"of {name} only {gain:.1%} survives, expected at least {LEAST_GAIN:.0%}"
-
-    def _better_than_possible(self) -> Iterator[str]:
-        ratio = self.oracle_ratio
-        if ratio is not None and ratio < LEAST_ORACLE_RATIO:
-            yield (
-                f"the Allan deviation at 1 h is {ratio:.2f} of what removing the true drift leaves, expected at least "
-                f"{LEAST_ORACLE_RATIO}: noise or true rate went along with the drift"
-            )
+HEAT_STD = 0.05 * DEG_H  # rad/s
 
 
 def find_leaks(
@@ -150,8 +68,8 @@ def find_leaks(
     Raises
     ------
     ValueError
-        If the record is too short to hold two periods of a rate in the drift band, has less than a reading in 100 s, or
-        no noise.
+        If the record is too short to hold two periods of a rate in the drift band, has less than a reading in 100 s,
+        no noise, or a temperature that never moves.
     """
     fs = record.sample_rate_hz
     if fs * BLOCK < 1.0:
@@ -165,7 +83,10 @@ def find_leaks(
             f"got {record.rate.size / fs:g} s"
         )
         raise ValueError(msg)
-    gains, step_gain, earth_gain = _survival(compensate, record, plain, periods, tell)
+    if not np.ptp(record.temperature) > 0.0:
+        msg = f"temperature: expected one that moves, got {record.temperature[0]:g} K throughout: nothing to compensate"
+        raise ValueError(msg)
+    gains, (step_gain, earth_gain, heat_gain) = _survival(compensate, record, plain, periods, tell)
     tell("fitting Allan curves")
     bandwidth, fitted_to = cutoff(gains), described_to(allan_deviation(record.rate, fs))
     return Audit(
@@ -176,6 +97,7 @@ def find_leaks(
         gains=gains,
         step_gain=step_gain,
         earth_gain=earth_gain,
+        heat_gain=heat_gain,
         bandwidth_hz=bandwidth,
         drift_reduction=None if drift is None else _reduction(drift, plain - (record.rate - drift), fs),
     )
@@ -187,8 +109,8 @@ def _survival(
     plain: FloatArray,
     periods: tuple[float, ...],
     tell: Callable[[str], None],
-) -> tuple[tuple[LineGain, ...], float | None, float | None]:
-    """Return what survives of sines, of a step and of Earth-rate steps."""
+) -> tuple[tuple[LineGain, ...], tuple[float | None, float | None, float | None]]:
+    """Return what survives of sines; and of a step, of Earth-rate steps and of a rate that follows temperature."""
     t = sample_times(0, record.rate.size, record.sample_rate_hz)
     tell("compensating it with known sines added")
     amplitudes = [SLOW_SINE if period >= DRIFT_PERIOD else FAST_SINE for period in periods]
@@ -203,7 +125,11 @@ def _survival(
             tell(f"it fails: {error}")
             return None
 
-    return gains, share("a known step", step(t, STEP)), share("Earth-rate steps", earth_turns(t))
+    return gains, (
+        share("a known step", step(t, STEP)),
+        share("Earth-rate steps", earth_turns(t)),
+        share("a rate that follows temperature", heat_rate(record.temperature, HEAT_STD)),
+    )
 
 
 def _reduction(drift: FloatArray, rest: FloatArray, sample_rate_hz: float) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
-from testbed.drift.summary import audit_summary
+from testbed.drift.summary import audit_summary, start_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.pages.template import render
 from testbed.units import DEG_H
@@ -15,7 +15,7 @@ from testbed.units import DEG_H
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from testbed.drift.leak import Audit
+    from testbed.drift.findings import Audit
     from testbed.drift.quality import Quality
     from testbed.drift.records import ThermalRecord
     from testbed.signals import FloatArray
@@ -37,6 +37,8 @@ class Audited:
         The findings.
     extrapolated : float, optional
         Share of samples outside the trained range [-].
+    start_distance : float, optional
+        From the first temperature to the nearest start of a training cycle [K].
     trained_on : tuple of str, optional
         Names of the cycles that it was trained on before.
     """
@@ -46,6 +48,7 @@ class Audited:
     compensated: FloatArray
     audit: Audit
     extrapolated: float | None = None
+    start_distance: float | None = None
     trained_on: tuple[str, ...] = ()
 
 
@@ -83,6 +86,7 @@ def audit_document(audited: Audited) -> dict[str, Any]:
         "trained_on": list(audited.trained_on),
         "record": audited.thermal.name,
         "extrapolated": audited.extrapolated,
+        **start_summary(audited.start_distance),
         **audit_summary(audited.audit),
     }
 
@@ -128,6 +132,7 @@ def _page(audited: Audited, figures: dict[str, object]) -> str:
         sample_rate_hz=record.sample_rate_hz,
         audit=figures,
         extrapolated=audited.extrapolated,
+        start=start_summary(audited.start_distance),
         trained_on=audited.trained_on,
         paper={name: TABLE_2[name] for name in (ORIGINAL, PIPELINE)},
     )

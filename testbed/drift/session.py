@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from inspect import getdoc
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,15 +13,17 @@ import numpy as np
 from pydantic import ValidationError
 
 from testbed._version import __version__
-from testbed.compensation import PAPER, paper3
+from testbed.compensation import LITERATURE
 from testbed.compensation.document import ModelDocument, sealed
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.document import findings
 from testbed.drift.leak import find_leaks
 from testbed.drift.page import Audited, write_audit
 from testbed.drift.records import ThermalRecord, check_options, read_thermal
+from testbed.drift.summary import start_summary
 from testbed.errors import Problem, ScenarioError, UnknownNameError, shortened
 from testbed.inputs.files import read_bytes
+from testbed.parts import resolve
 from testbed.runs.atomic import write_text
 from testbed.runs.folder import RunFolder, failing_as_run_error
 from testbed.units import DEG_H
@@ -28,9 +31,7 @@ from testbed.units import DEG_H
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from testbed.compensation.record import GyroRecord
     from testbed.drift.columns import Columns
-    from testbed.signals import FloatArray
 
 # A rate taken for a temperature moves by less, and so does an oven that was not switched on.
 LEAST_SPAN = 1.0  # K
@@ -185,7 +186,8 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     Returns
     -------
     dict
-        Method, name of the record and the share of its samples outside the trained range.
+        Method, name of the record, the share of its samples outside the trained range and how far from the trained
+        ones it starts.
 
     Raises
     ------
@@ -206,7 +208,12 @@ def apply_model(path: Path, source: Path, columns: Columns, out: Path, tell: Cal
     with failing_as_run_error(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out, "\n".join(["time_s,rate_deg_h,drift_deg_h,extrapolated", *lines]) + "\n")
-    return {"method": model.method, "record": thermal.name, "extrapolated": float(block.extrapolated.mean())}
+    return {
+        "method": model.method,
+        "record": thermal.name,
+        "extrapolated": float(block.extrapolated.mean()),
+        **start_summary(model.start_distance(thermal.record)),
+    }
 
 
 def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Callable[[str], None]) -> Audited:
@@ -215,7 +222,7 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     Parameters
     ----------
     model : str
-        Model file, or `PAPER` for the paper's own protocol, which trains on the record that it corrects.
+        Model file, or a name of `LITERATURE`, which works on the record that it corrects.
     source : Path
         Run folder or text file.
     columns : Columns
@@ -233,13 +240,15 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
         If the disk is full.
     """
     check_options([source], columns)
-    trained = None if model == PAPER else _read_document(Path(model))
+    trained = None if model in LITERATURE else _read_document(Path(model))
     thermal = read_thermal(source, columns)
     with RunFolder(out) as folder, failing_as_run_error(str(out)):
         tell(f"compensating {thermal}")
         try:
             audited = (
-                _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
+                _audit_published(model, thermal, tell)
+                if trained is None
+                else _audit_trained(Path(model), *trained, thermal, tell)
             )
         except ValueError as error:
             raise ScenarioError([Problem(str(error), file=str(source))]) from error
@@ -248,13 +257,13 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     return audited
 
 
-def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
-    def compensate(record: GyroRecord) -> FloatArray:
-        return paper3.compensate(record).rate
-
+def _audit_published(name: str, thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
+    """Audit a method of the literature; the first line of its docstring says what it is."""
+    compensate = resolve("method", name, LITERATURE)
     compensated = compensate(thermal.record)
     found = find_leaks(compensate, thermal.record, compensated, thermal.drift, tell)
-    return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
+    summary = (getdoc(compensate) or name).splitlines()[0].rstrip(".")
+    return Audited(summary, thermal, compensated, found)
 
 
 def _audit_trained(
@@ -264,4 +273,5 @@ def _audit_trained(
     found = find_leaks(lambda record: model.apply(record).rate, thermal.record, block.rate, thermal.drift, tell)
     found = replace(found, seen=thermal.fingerprint in trained_on)
     name, outside = f"frozen {model.method} model {path.name}", float(block.extrapolated.mean())
-    return Audited(name, thermal, block.rate, found, outside, tuple(trained_on.values()))
+    away = model.start_distance(thermal.record)
+    return Audited(name, thermal, block.rate, found, outside, away, tuple(trained_on.values()))

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.drift.leak import DRIFT_PERIOD
+from testbed.compensation.model_only import START_MARGIN
+from testbed.drift.findings import DRIFT_PERIOD
 from testbed.judging.allan_analysis import TERMS
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:
     from testbed.allan.fit import AllanFit
-    from testbed.drift.leak import Audit
+    from testbed.drift.findings import Audit
     from testbed.drift.quality import Quality
 
 # Letters of the coefficients that papers on fibre-optic gyros print.
@@ -34,8 +35,9 @@ def audit_summary(audit: Audit) -> dict[str, Any]:
         With the units in the names; `before`, `after`, `low_passed` and `oracle` as `quality_summary` gives them.
     """
     return {
-        "passed": not audit.leaks,
+        "passed": audit.passed,
         "leaks": list(audit.leaks),
+        "excess": list(audit.excess),
         "trained_on_this_record": audit.seen,
         "drift_reduction": _finite(audit.drift_reduction),
         "oracle_ratio_1h": _finite(audit.oracle_ratio),
@@ -44,6 +46,7 @@ def audit_summary(audit: Audit) -> dict[str, Any]:
         "least_gain_in_drift_band": min(line.gain for line in audit.gains if line.period >= DRIFT_PERIOD),
         "step_gain": audit.step_gain,
         "earth_rate_gain": audit.earth_gain,
+        "temperature_rate_gain": audit.heat_gain,
         "gains": [
             {"period_s": line.period, "gain": line.gain, "phase_deg": math.degrees(line.phase)} for line in audit.gains
         ],
@@ -56,6 +59,20 @@ def audit_summary(audit: Audit) -> dict[str, Any]:
                 ("oracle", audit.oracle),
             )
         },
+    }
+
+
+def start_summary(distance: float | None) -> dict[str, Any]:
+    """Return how far from the trained ones a record starts [K], and whether that is too far; None if nothing is known.
+
+    Parameters
+    ----------
+    distance : float or None
+        Of `DriftModel.start_distance` [K].
+    """
+    return {
+        "start_distance_k": distance,
+        "starts_elsewhere": None if distance is None else distance > START_MARGIN,
     }
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from testbed.logs.channel import LogChannel
     from testbed.logs.selection import TextOptions
+    from testbed.runs.results import RunRecord
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 
@@ -114,7 +115,8 @@ def as_record(channel: LogChannel, name: str) -> RateRecord:
 def read_run(folder: Path, sensor: str | None = None) -> list[RateRecord]:
     """Return what each sensor of a run read after settling, less what it reads of the same truth without noise.
 
-    So neither the motion nor the sensor's dynamics show, on a moving table as at standstill.
+    So neither the motion nor the sensor's dynamics show, on a moving table as at standstill. Of a replayed recording,
+    whose truth nobody knows so well, it is what was read.
 
     Parameters
     ----------
@@ -137,6 +139,8 @@ def read_run(folder: Path, sensor: str | None = None) -> list[RateRecord]:
     from testbed.scenario.loader import load_instruments
 
     run = RunRecord.open(folder)
+    if run.metrics.replay is not None:
+        return _read_replay(folder, run, sensor)
     scenario = load_instruments(folder / "scenario.yaml")
     if sensor is not None and sensor in run.sensors and sensor not in scenario.sensors:
         msg = "is of a plug-in's type: its noise-free reading would need the plug-in, which reading a run never loads"
@@ -154,6 +158,21 @@ def read_run(folder: Path, sensor: str | None = None) -> list[RateRecord]:
         records.append(
             RateRecord(f"{scenario.name}_{name}", noise, instrument.sample_rate, content, signal=f"sensors/{name}")
         )
+    return records
+
+
+def _read_replay(folder: Path, run: RunRecord, sensor: str | None) -> list[RateRecord]:
+    if sensor is not None and sensor not in run.sensors:
+        raise refusal(folder, str(UnknownNameError("sensor", sensor, run.sensors)), "--sensor")
+    settle, records = run.metrics.settle_s, []
+    for name in run.metrics.sensors if sensor is None else [sensor]:
+        signals = run.sensors[name]
+        rate = signals.rate[math.ceil(settle * signals.sample_rate_hz) :]
+        if not np.isfinite(rate).any():
+            raise refusal(folder, "expected readings, got none", f"sensors.{name}")
+        content = f"{name} of {run.metrics.scenario}, as recorded, from {settle:g} s on"
+        title = f"{run.metrics.scenario}_{name}"
+        records.append(RateRecord(title, rate, signals.sample_rate_hz, content, signal=f"sensors/{name}"))
     return records
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from testbed.logs.options import refusal
@@ -39,7 +40,10 @@ class FileChain:
                 raise refusal(table.path, message, "file")
         self.path: Path = tables[0].path
         self.format = f"{tables[0].format}; {len(tables)} files"
-        self.columns: Sequence[TableColumn] = tables[0].columns
+        self.columns: Sequence[TableColumn] = [
+            replace(column, about=sum(table.columns[i].n_time or table.columns[i].about or 0 for table in tables))
+            for i, column in enumerate(tables[0].columns)
+        ]
         self.header: Mapping[str, str] = tables[0].header
         self._n_first: int | None = None
 

@@ -54,6 +54,8 @@ class LogChannel:
         Range of the sensor [SI].
     factor : float
         SI value of a one in the file.
+    start_ns : int
+        When the first sample was taken, where there are no stamps [ns].
     """
 
     name: str
@@ -70,6 +72,7 @@ class LogChannel:
     table: Table
     largest: float | None = None
     factor: float = 1.0
+    start_ns: int = 0
 
     def even(self) -> FloatArray:
         """Return the values on an even grid of `rate_hz`, NaN where samples are lost.

@@ -56,7 +56,7 @@ def select(path: Path, wanted: Selection, text: TextOptions | None = None) -> li
     columns = wanted.column or _rotations(table, wanted)
     maps = [channel_map(column=c, unit=wanted.unit, scale=wanted.scale, kind=wanted.kind, time=time) for c in columns]
     plans = [plan(one.column if wanted.column else _name(table, one), one, table) for one in maps]
-    channels = list(read_plans(averaged(plans, 1 if wanted.average is None else wanted.average)).values())
+    channels = list(read_plans(averaged(plans, wanted.average)).values())
     if rate_hz is not None and wanted.time is not None:
         _refuse_contradiction(channels[0], rate_hz)
     return channels
@@ -91,9 +91,7 @@ def _mapped(path: Path, wanted: Selection) -> list[LogChannel]:
     place = wanted.map or path
     if wanted.given:
         raise refusal(place, f"says this: leave out {', '.join(wanted.given)}", "--map")
-    channels = read_map(
-        None if wanted.map is None else path, load_map(place), 1 if wanted.average is None else wanted.average
-    ).channels
+    channels = read_map(None if wanted.map is None else path, load_map(place), wanted.average).channels
     unknown = [name for name in wanted.column or [] if name not in channels]
     if unknown:
         raise refusal(place, str(UnknownNameError("channel", unknown[0], channels)), "--column")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +27,22 @@ if TYPE_CHECKING:
 # Numbers that are kept at most: 1 GB of them, and what is made of them takes as much several times over.
 MOST_KEPT = 1 << 27
 _GOOD_AVERAGE = 1000
+# Samples that are kept one by one unless more are asked for, and means that are kept of more: 500 MB with all that is
+# made of them.
+MOST_WHOLE = 1 << 23
+_MEANS = 1 << 21
+
+
+def fitting(one: Plan) -> Plan:
+    """Return a plan that keeps the means of as many samples as memory asks for, a power of 2, and says so."""
+    column = one.table.columns[one.value]
+    n_time = max(column.n_time or 0, column.about or 0)
+    if n_time <= MOST_WHOLE:
+        return one
+    average = 1 << math.ceil(math.log2(n_time / _MEANS))
+    remedy = f"--average 1 keeps all, up to {MOST_KEPT >> 20} million"
+    said = f"about {n_time:.1e} samples: means of {average} are kept; {remedy}"
+    return replace(one, average=average, assumed=(*one.assumed, said))
 
 
 def kept_columns(

@@ -63,7 +63,7 @@ def propose(table: Table) -> Proposal:
     if len(places) > _MOST_CHANNELS:
         left.append(f"{len(places) - _MOST_CHANNELS} of {len(places)} channels were left out")
     plans = short_names(plans)
-    left += [_unsaid(one) for one in plans if _unsaid(one)]
+    left += [unsaid(one) for one in plans if unsaid(one)]
     return Proposal(plans, tuple(dict.fromkeys(left)))
 
 
@@ -73,7 +73,14 @@ def _untimed(table: Table, place: int) -> Plan:
     return replace(found, rate_hz=None, stamps=None)
 
 
-def _unsaid(one: Plan) -> str:
+def unsaid(one: Plan) -> str:
+    """Return what a file's own words leave open of a channel, with what would say it; empty if nothing.
+
+    Parameters
+    ----------
+    one : Plan
+        How it is read.
+    """
     if not one.quantity:
         return f"{one.name}: unit (--unit, or --scale of a count)"
     if one.quantity == "angle" and one.kind is None:

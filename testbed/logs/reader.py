@@ -14,7 +14,7 @@ from testbed.logs.chain import FileChain
 from testbed.logs.channel import FEWEST, Log, LogChannel, refuse_uneven
 from testbed.logs.clock import ClockScan
 from testbed.logs.formats import open_table
-from testbed.logs.keeping import kept_columns
+from testbed.logs.keeping import fitting, kept_columns
 from testbed.logs.logmap import ChannelMap, LogMap, load_map
 from testbed.logs.names import take_apart
 from testbed.logs.options import refusal
@@ -92,8 +92,10 @@ def as_map(given: LogMap | Mapping[str, Any] | str | Path | None) -> LogMap | No
     return given
 
 
-def read_map(path: Path | None, found: LogMap | None, average: int = 1) -> Log:
-    """Read the channels of a map from a file, or from the map's own files; the means of so many samples."""
+def read_map(path: Path | None, found: LogMap | None, average: int | None = 1) -> Log:
+    """Read the channels of a map from a file, or from the map's own files; the means of so many samples, None as many
+    as memory asks for.
+    """
     if found is None:
         assert path is not None
         table = open_table(path)
@@ -128,8 +130,10 @@ def short_names(plans: list[Plan]) -> list[Plan]:
     ]
 
 
-def averaged(plans: Sequence[Plan], average: int) -> list[Plan]:
-    """Return plans that keep the means of so many samples; ScenarioError if it is none."""
+def averaged(plans: Sequence[Plan], average: int | None) -> list[Plan]:
+    """Return plans that keep the means of so many samples, None as many as memory asks for; ScenarioError if none."""
+    if average is None:
+        return [fitting(one) for one in plans]
     if average < 1:
         raise ScenarioError([Problem(f"expected a number of samples from 1 on, got {average}", key="--average")])
     return [replace(one, average=average) for one in plans]
@@ -212,6 +216,7 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
         table=table,
         largest=one.largest,
         factor=one.factor,
+        start_ns=one.offset_ns,
     )
 
 

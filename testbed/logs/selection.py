@@ -71,7 +71,7 @@ class Selection:
     rate, time, time_unit : str, optional
         Sample rate, in hertz or with its unit; column of the time, and its unit.
     average : int, optional
-        Samples of which the mean is kept, so that a long recording fits into memory.
+        Samples of which the mean is kept; left out: 1, of over 8 million samples as many as memory asks for.
     map : Path, optional
         The map, instead of all these but `column`, which then are its channels, and `average`.
     """
@@ -105,7 +105,10 @@ class Selection:
     )
     average: int | None = field(
         default=None,
-        metadata=_words("--average", "Keep the means of this many samples, so that a long recording fits into memory."),
+        metadata=_words(
+            "--average",
+            "Keep the means of this many samples; default 1, of over 8 million samples as many as memory asks for.",
+        ),
     )
     map: Path | None = field(
         default=None, metadata=_words("--map", "Map of the recording, instead of these.", "LOG.yaml")

@@ -31,6 +31,8 @@ class TableColumn:
         Number of samples, where the format says it.
     rate_hz : float, optional
         Sample rate that the file itself states [Hz].
+    about : int, optional
+        About how many samples, where the format does not say it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class TableColumn:
     group: str = ""
     n_time: int | None = None
     rate_hz: float | None = None
+    about: int | None = None
 
     def __post_init__(self) -> None:
         # A name is printed: a control character in it would act on the terminal.

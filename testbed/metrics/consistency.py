@@ -32,13 +32,19 @@ class Whiteness:
     .. math:: \mathrm{NIS} = \langle \nu^2 \rangle, \qquad
         \rho_l = \sum \nu_k \nu_{k-l} / \sum \nu_k^2, \; l = 1 \ldots 10
 
-    Only sums and the last ten values are kept, so memory does not grow.
+    Only sums and the last values are kept, so memory does not grow.
+
+    Parameters
+    ----------
+    lags : int, optional
+        How many; ten unless told otherwise.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lags: int = LAGS) -> None:
         self.n = 0
-        self._products = np.zeros(LAGS + 1)
-        self._last = np.zeros(LAGS)
+        self._lags = lags
+        self._products = np.zeros(lags + 1)
+        self._last = np.zeros(lags)
 
     def add(self, innovation: FloatArray, variance: FloatArray) -> None:
         """Add the innovations of a block.
@@ -53,7 +59,7 @@ class Whiteness:
         # Zeros stand for what was before the first one: they add nothing to any product.
         series = np.concatenate([self._last, fresh])
         self.n += fresh.size
-        self._products += [series[LAGS - lag : series.size - lag] @ fresh for lag in range(LAGS + 1)]
+        self._products += [series[self._lags - lag : series.size - lag] @ fresh for lag in range(self._lags + 1)]
         # A copy: a view would keep the whole block.
         self._last = series[fresh.size :].copy()
 
@@ -68,18 +74,20 @@ class Whiteness:
         low, high = chdtri(self.n, [1.0 - MISS / 2.0, MISS / 2.0]) / self.n
         return float(low), float(high)
 
+    def correlations(self) -> FloatArray:
+        """Return the correlation at lags 1, 2, ... [-], shape (n_lag,); none if undefined."""
+        return self._products[1:] / self._products[0] if self._products[0] > 0.0 else np.empty(0)
+
     def correlation(self) -> float | None:
-        """Return the correlation of largest size over lags 1 to 10 [-]; None if undefined."""
-        if not self._products[0] > 0.0:
-            return None
-        rho = self._products[1:] / self._products[0]
-        return finite(rho[np.argmax(np.abs(rho))])
+        """Return the correlation of largest size over the lags [-]; None if undefined."""
+        rho = self.correlations()
+        return finite(rho[np.argmax(np.abs(rho))]) if rho.size else None
 
     def correlation_bound(self) -> float:
         """Return what it stays below by chance if they are white [-]: 1/sqrt(n) per lag, and the miss shared by the
         lags.
         """
-        return float(-ndtri(MISS / (2.0 * LAGS)) / math.sqrt(self.n))
+        return float(-ndtri(MISS / (2.0 * self._lags)) / math.sqrt(self.n))
 
 
 class Consistency:
@@ -88,14 +96,20 @@ class Consistency:
     .. math:: \mathrm{NEES} = \langle (\hat x - x)^2 / \sigma^2 \rangle
 
     of the rate. Errors of one run hang together in time, by the slowest mode of the filter, so no bound is given for
-    it; the innovations of a consistent filter are white, and have one.
+    it; the innovations of a consistent filter are white, and have one. Without a truth the innovations alone decide.
+
+    Parameters
+    ----------
+    known : bool, optional
+        Whether there is a truth.
 
     References
     ----------
     Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), section 5.4.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, known: bool = True) -> None:
+        self._known = known
         self._n = 0
         self._square = 0.0
         self._sensors: dict[str, Whiteness] = {}
@@ -137,17 +151,14 @@ class Consistency:
 
     def _verdict(self, nees: float | None) -> str | None:
         """Return in one word whether the claims hold within FACTOR: the error decides, then the innovations."""
-        if nees is None:
+        if nees is None and self._known:
             return None
-        if nees > FACTOR:
+        if nees is not None and nees > FACTOR:
             return "optimistic"
-        if nees < 1.0 / FACTOR:
+        if nees is not None and nees < 1.0 / FACTOR:
             return "pessimistic"
-        for sums in self._sensors.values():
-            nis = sums.nis()
-            if nis is None:
-                continue
-            low, high = sums.nis_bounds()
+        judged = [(nis, sums.nis_bounds()) for sums in self._sensors.values() if (nis := sums.nis()) is not None]
+        for nis, (low, high) in judged:
             if not low / FACTOR <= nis <= high * FACTOR:
                 return "innovations too large" if nis > 1.0 else "innovations too small"
-        return "consistent"
+        return "consistent" if judged or self._known else None

@@ -1,6 +1,7 @@
 """The bias of a fibre-optic gyro that follows temperature: statics, Shupe effect, coil gradient, hysteresis, lags.
 
-Pure heat and mechanics: no random numbers and no readings. The numbers are the instrument's, see the sensor's preset.
+Heat and mechanics, no readings; random only where coefficients scatter between cycles, by the generator that is handed
+in. The numbers are the instrument's, see the sensor's preset.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ ShupeCoefficient = Annotated[float, Quantity("rad/K", "0.45 deg/h/(K/min)")]
 ShupePerKelvin = Annotated[float, Quantity("rad/K^2", "0.002 deg/h/(K/min)/K")]
 # A step of temperature: the bound catches one written in degC, which is read as absolute.
 HalfWidth = Annotated[float, Quantity("K", "5 K", at_least=0.0, at_most=100.0)]
+# Beyond 1 a coefficient has no sign of its own.
+Scatter = Annotated[float, Quantity("", "10 %", at_least=0.0, at_most=1.0)]
+# What scatters; lags and widths are geometry.
+COEFFICIENTS = ("linear", "quadratic", "cubic", "shupe", "shupe_temperature", "gradient", "hysteresis")
 
 
 @njit(cache=True)
@@ -78,6 +83,8 @@ class FogThermal(Part):
         r_1, r_2 of the play operators [K].
     coil_lag, spool_lag, core_lag : float
         tau_c, tau_s, tau_o [s].
+    scatter : float
+        Standard deviation, between one switch-on and the next, of each coefficient over itself [-]; see `drawn`.
 
     References
     ----------
@@ -98,6 +105,31 @@ class FogThermal(Part):
     coil_lag: PositiveDuration = 900.0
     spool_lag: PositiveDuration = 1500.0
     core_lag: PositiveDuration = 2400.0
+    scatter: Scatter = 0.0
+
+    def drawn(self, rng: np.random.Generator) -> FogThermal:
+        r"""Return the instrument of one cycle, :math:`c (1 + s \epsilon)` with a normal epsilon per coefficient.
+
+        What is no temperature and does not come back from cycle to cycle: stress that relaxes, moisture, glue. A model
+        trained on other cycles cannot know it. Lags and half-widths stay.
+
+        Parameters
+        ----------
+        rng : Generator
+            Of this cycle.
+
+        Returns
+        -------
+        FogThermal
+            Without scatter; itself if it has none.
+        """
+        if not self.scatter:
+            return self
+        n_play = len(self.hysteresis)
+        factors = 1.0 + self.scatter * rng.standard_normal(len(COEFFICIENTS) - 1 + n_play)
+        single = {name: getattr(self, name) * factor for name, factor in zip(COEFFICIENTS[:-1], factors, strict=False)}
+        hysteresis = tuple(h * factor for h, factor in zip(self.hysteresis, factors[-n_play:], strict=True))
+        return self.model_copy(update={**single, "hysteresis": hysteresis, "scatter": 0.0})
 
     def start(self, sample_rate_hz: float, temperature: float | None = None) -> FogThermalStage:
         """Return the instrument's temperatures in equilibrium.

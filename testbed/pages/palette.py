@@ -33,6 +33,8 @@ NAMED = {
     "fusion/complementary": "#a8705a",
     "fusion/blending": "#6b8f2a",
     "fusion/allan_srkf": "#9a7398",
+    "fusion/vb_akf": "#c85a70",
+    "fusion/imm": "#4f934d",
 }
 # Hues of names that do not ship, in turns from red on.
 _HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42), "columns": (0.0, 1.0)}

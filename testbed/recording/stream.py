@@ -55,12 +55,21 @@ class Clock:
         window = (-(-start // stride), end // stride + 1) if detailed else (0, 0)
         return Detail(-(-self.n_time // stride), window, gaps=gaps)
 
+    def chooser_of(self, times_ns: NDArray[np.int64], *, detailed: bool, gaps: bool) -> Detail:
+        """Return the chooser for a signal with its own stamps [ns], shape (n_sample,)."""
+        first, last = (int(np.searchsorted(times_ns, round(1e9 * t))) for t in self.detail)
+        return Detail(times_ns.size, (first, last + 1) if detailed else (0, 0), gaps=gaps)
+
 
 class Recording:
     """A Rerun stream with the run's clock; every call is strict, so nothing is dropped with a warning."""
 
-    def __init__(self, stream: rr.RecordingStream, clock: Clock) -> None:
-        self.stream, self.clock = stream, clock
+    def __init__(self, stream: rr.RecordingStream, clock: Clock, *, live: bool = False) -> None:
+        self.stream, self.clock, self._live = stream, clock, live
+
+    def batch(self, send: Callable[..., None], size: int) -> Batch:
+        """Return what holds rows back until there are `size` of them; if somebody looks on, nothing is held back."""
+        return Batch(send, 1 if self._live else size)
 
     def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what does not change in time."""
@@ -68,7 +77,10 @@ class Recording:
 
     def columns(self, entity: str, index: NDArray[np.int64], columns: Iterable[rr.ComponentColumn]) -> None:
         """Log one row for each base sample of `index`."""
-        stamps = self.clock.nanoseconds(index)
+        self.rows(entity, self.clock.nanoseconds(index), columns)
+
+    def rows(self, entity: str, stamps: NDArray[np.timedelta64], columns: Iterable[rr.ComponentColumn]) -> None:
+        """Log one row for each of the stamps."""
         self.stream.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=stamps)], columns, strict=True)
 
     def lines(self, entity: str, names: Sequence[str], colors: Sequence[str], width: float = 1.5) -> None:
@@ -130,6 +142,8 @@ class Signal:
         Whether it has every sample inside the window of the clock.
     gaps : bool
         Whether what is not finite is lost and leaves a gap; otherwise it was not due.
+    times_ns : ndarray, shape (n_sample,), optional
+        Stamps of its samples [ns], of a signal that is not on the clock of the run.
     """
 
     def __init__(
@@ -143,11 +157,17 @@ class Signal:
         width: float = 1.5,
         detailed: bool = True,
         gaps: bool = True,
+        times_ns: NDArray[np.int64] | None = None,
     ) -> None:
         self.entity = entity
-        self._recording, self._stride = recording, stride
-        self._chooser = recording.clock.chooser(stride, detailed=detailed, gaps=gaps)
-        self._batch = Batch(self._send, ROWS)
+        self._recording, self._stride, self._times = recording, stride, times_ns
+        clock = recording.clock
+        self._chooser = (
+            clock.chooser(stride, detailed=detailed, gaps=gaps)
+            if times_ns is None
+            else clock.chooser_of(times_ns, detailed=detailed, gaps=gaps)
+        )
+        self._batch = recording.batch(self._send, ROWS)
         recording.lines(entity, [name], [color], width)
 
     def write(self, values: FloatArray) -> None:
@@ -160,4 +180,6 @@ class Signal:
         self._batch.flush()
 
     def _send(self, index: NDArray[np.int64], values: FloatArray) -> None:
-        self._recording.columns(self.entity, index * self._stride, rr.Scalars.columns(scalars=values))
+        clock = self._recording.clock
+        own = clock.nanoseconds(index * self._stride) if self._times is None else self._times[index]
+        self._recording.rows(self.entity, own.astype("timedelta64[ns]"), rr.Scalars.columns(scalars=values))

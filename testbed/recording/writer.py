@@ -16,16 +16,18 @@ from rerun.chunk import RrdReader
 from testbed.errors import RunError
 from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
-from testbed.recording.layout import blueprint
+from testbed.recording.layout import LOG, blueprint
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
+from testbed.runs.block import PlayedBlock, clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from types import TracebackType
 
     import mujoco
+    from numpy.typing import NDArray
 
     from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
@@ -58,14 +60,18 @@ class RecordingWriter:
         Rate of each sensor [Hz], a divisor of the base rate.
     fusion_names : sequence of str
         Filters, whose estimates come at the rate of the fastest sensor.
-    model : mujoco.MjModel
-        Bodies of the turntable.
+    model : mujoco.MjModel, optional
+        Bodies of the turntable; a recording that is replayed has none.
     settle : float
         Start of the part that is judged [s].
     detail : tuple of float, optional
         Start and end of the window recorded sample by sample [s]; by default the 2 s after `settle`.
     pose_stride : int
         Base samples between poses and between profiles.
+    times_ns : mapping of str to ndarray, shape (n_time,), optional
+        Stamps [ns] of ``base`` and of every sensor, where they are no multiples of one step.
+    live : str, optional
+        Address of a viewer that shows it while it is written.
 
     Raises
     ------
@@ -82,55 +88,82 @@ class RecordingWriter:
         n_time: int,
         sensor_rates: Mapping[str, float],
         fusion_names: Sequence[str],
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | None,
         settle: float,
         detail: tuple[float, float] | None = None,
         pose_stride: int = 400,
+        times_ns: Mapping[str, NDArray[np.int64]] | None = None,
+        live: str | None = None,
     ) -> None:
-        self._path = Path(path)
-        self._model, self._pose_stride = model, pose_stride
+        self._path, self._live = Path(path), live
+        self._model, self._pose_stride, self._times = model, pose_stride, times_ns
         self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
         self._fusion_names = list(fusion_names)
         self._fusion_stride = min(self._strides.values(), default=1)
         self._colors = series_colors(list(sensor_rates), self._fusion_names)
         self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
         try:
-            self._stream.save(self._path)
+            if live is None:
+                self._stream.save(self._path)
+            else:
+                self._stream.set_sinks(rr.GrpcSink(live), rr.FileSink(self._path))
         except RuntimeError as error:
             raise self._failure(str(error)) from error
         self._stream.send_recording_name(scenario_name)
-        self._recording = Recording(self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)))
+        self._recording = Recording(
+            self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)), live=live is not None
+        )
         self._signals: dict[str, Signal] = {}
-        self._world = World(self._recording, model, {name: self._colors[f"sensors/{name}"] for name in sensor_rates})
+        bodies = {name: self._colors[f"sensors/{name}"] for name in sensor_rates}
+        self._world = None if model is None else World(self._recording, model, bodies)
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
-        self._moved = False
+        self._moved = self._laid_out = False
         self._open = True
 
-    def write(self, block: RunBlock) -> None:
+    def write(self, block: RunBlock | PlayedBlock) -> None:
         """Add the next block of the run."""
+        if isinstance(block, PlayedBlock):
+            self._write_rates(block.sensors, block.reference)
+            self._write_estimates(block, block.reference)
+        else:
+            self._write_run(block)
+        if self._live is not None and not self._laid_out:
+            # What there is to see is known now; somebody is looking.
+            self._stream.send_blueprint(self._blueprint(live=True))
+            self._laid_out = True
+
+    def _write_run(self, block: RunBlock) -> None:
         truth = block.truth.rate
         self._moved |= bool(np.any(block.command.rate))
         self._add("/commanded/rate", block.command.rate[: truth.size], 1, "commanded [rad/s]", "commanded", 1.0)
-        self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
-        for name, readings in block.sensors.items():
-            key = f"sensors/{name}"
-            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+        self._write_rates(block.sensors, truth)
         for name, temperature in block.temperatures.items():
             key, drift = f"sensors/{name}", block.drifts[name]
             self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
             self._add(f"/truth/{name}/drift", drift, 1, f"{name} [rad/s]", key, detailed=False)
-        reference = truth[-block.start % self._fusion_stride :: self._fusion_stride]
+        self._write_estimates(block, truth[-block.start % self._fusion_stride :: self._fusion_stride])
+        self._write_sights(block)
+        self._write_poses(block)
+
+    def _write_rates(self, sensors: Mapping[str, FloatArray], truth: FloatArray | None) -> None:
+        if truth is not None:
+            self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
+        for name, readings in sensors.items():
+            key = f"sensors/{name}"
+            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+
+    def _write_estimates(self, block: RunBlock | PlayedBlock, reference: FloatArray | None) -> None:
         for name, estimate in block.fusion.items():
-            key = f"fusion/{name}"
-            stride = self._fusion_stride
+            key, stride = f"fusion/{name}", self._fusion_stride
             self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
-            self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
+            if reference is not None:
+                self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
-        self._write_sights(block)
-        self._write_poses(block)
+                if series.startswith(("R_", "Q_", "N_")):
+                    self._add(f"/{key}/{LOG}{series}", _log10(values), stride, name, key, detailed=False, gaps=False)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -149,7 +182,8 @@ class RecordingWriter:
             channel.finish()
         if self._target is not None:
             self._target.finish()
-        self._world.finish()
+        if self._world is not None:
+            self._world.finish()
         self._stream.send_blueprint(self._blueprint())
         try:
             # Only flush reports a full disk; disconnect is silent about it.
@@ -177,6 +211,9 @@ class RecordingWriter:
             try:
                 self._stream.flush(timeout_sec=LET_GO_TIMEOUT)
             except RuntimeError:
+                if self._live is not None and not self._is_full():
+                    # The window was closed; the file, which is read back next, goes on without it.
+                    return
                 if self._is_full() or time.monotonic() > deadline:
                     raise
             else:
@@ -228,6 +265,7 @@ class RecordingWriter:
                 width=width,
                 detailed=detailed,
                 gaps=gaps,
+                times_ns=None if self._times is None else self._times[clock_of(key)],
             )
         self._signals[entity].write(values)
 
@@ -246,13 +284,14 @@ class RecordingWriter:
     def _write_poses(self, block: RunBlock) -> None:
         first = -block.start % self._pose_stride
         index = np.arange(block.start + first, block.start + block.truth.rate.size, self._pose_stride)
+        assert self._world is not None
         self._world.write(index, block.truth.poses, block.truth.angle[first :: self._pose_stride])
         for name, (heights, profiles) in block.profiles.items():
             if name not in self._channels:
                 self._channels[name] = Channel(self._recording, name, heights, self._colors[f"sensors/{name}"])
             self._channels[name].write(index, profiles)
 
-    def _blueprint(self) -> rr.blueprint.Blueprint:
+    def _blueprint(self, *, live: bool = False) -> rr.blueprint.Blueprint:
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
         hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
@@ -262,6 +301,7 @@ class RecordingWriter:
             channels=list(self._channels),
             model=self._model,
             clock=self._recording.clock,
+            live=live,
         )
 
     def _failure(self, reason: str) -> RunError:
@@ -272,3 +312,8 @@ class RecordingWriter:
         else:
             place = f"{'its disk is full: ' if free < FULL else ''}{free / 1e6:.1f} MB free"
         return RunError(f"{self._path}: the recording could not be written ({place}): {reason}")
+
+
+def _log10(values: FloatArray) -> FloatArray:
+    """Return the logarithm; NaN of what has none."""
+    return np.log10(values, where=values > 0.0, out=np.full(values.shape, np.nan))

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 from testbed.pages.palette import series_colors
 from testbed.pages.svg import FORMATS, figure_bytes
 from testbed.pages.template import render
+from testbed.report.bode import bode_figure, shows
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
-from testbed.report.digest import Digest, digest_run
+from testbed.report.closer import closer_views
+from testbed.report.digest import N_CLOSE, Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.pointing import inside_rows, sight_budget_figure, sight_curves_figure, sight_rows
-from testbed.report.words import METRICS, RATIOS, claims, further, honesty, over_bound, summary
+from testbed.report.within_figures import adapted_figure, whiteness_figure
+from testbed.report.words import METRICS, RATIOS, claims, finding_text, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
 from testbed.runs.results import RunRecord
@@ -106,6 +109,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         ratios=RATIOS,
         over_bound=over_bound,
         honesty=honesty,
+        finding_text=finding_text,
         line_error=line_error,
         metrics=metrics,
         names=_shown_metrics(metrics),
@@ -115,6 +119,8 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         summary=summary(metrics, digest),
         scenario=scenario,
         digest=digest,
+        closer=closer_views(digest, _colors(metrics), (unit, scale)),
+        closer_bins=N_CLOSE,
         bands=band_rows(metrics.budget, digest) if metrics.budget else [],
         line_optima=line_optima(metrics),
         sight_rows=sight_rows(metrics),
@@ -129,10 +135,13 @@ def _of_pointing(metric: str) -> bool:
 
 
 def _shown_metrics(metrics: RunMetrics) -> dict[str, str]:
-    """Return the columns of the error table: those in which some source has a value, and the error."""
+    """Return the columns of the error table: those in which some source has a value, and the error where there may be
+    one.
+    """
     sources = [*metrics.sensors.values(), *metrics.fusion.values()]
     known = {key for key in METRICS if any(getattr(source, RATIOS.get(key, key)) is not None for source in sources)}
-    return {key: name for key, name in METRICS.items() if key in {"rmse_deg_s", *known}}
+    always = set() if "mean_deg_s" in known else {"rmse_deg_s"}
+    return {key: name for key, name in METRICS.items() if key in always | known}
 
 
 def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
@@ -143,17 +152,27 @@ def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
     }
 
 
+def _colors(metrics: RunMetrics) -> dict[str, str]:
+    return series_colors(list(metrics.sensors), list(metrics.fusion))
+
+
 def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
-    colors, unit = series_colors(list(metrics.sensors), list(metrics.fusion)), error_unit(metrics)
+    colors, unit = _colors(metrics), error_unit(metrics)
     drawn = {}
     if metrics.pointing:
         drawn["sight_budget"] = sight_budget_figure(metrics.pointing)
         drawn["sight_curves"] = sight_curves_figure(metrics.pointing, colors)
     drawn["rates"] = rates_figure(digest, colors, unit)
-    if digest.filter_errors:
+    if digest.filter_errors and digest.has_truth:
         drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:
         drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density, unit)
+    if shows(metrics, digest.transfers):
+        drawn["bode"] = bode_figure(metrics, digest.transfers, colors)
+    if digest.correlations:
+        drawn["whiteness"] = whiteness_figure(digest.correlations, colors)
+    if digest.adapted:
+        drawn["adapted"] = adapted_figure(digest.adapted, colors, digest.duration_s, unit)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors, unit)
     if metrics.budget is not None:

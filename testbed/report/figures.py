@@ -71,18 +71,14 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
         for axes, part in ((above, "whole"), (zooms[0], "zoom")):
             for group in sensors:
                 draw(axes, getattr(digest.rates[group], part), colors[group], 0.9, scale=scale)
-            _dash_truth(axes, getattr(digest.rates["truth"], part), colors["truth"], scale)
-        if filters:
+            if digest.has_truth:
+                _dash_truth(axes, getattr(digest.rates["truth"], part), colors["truth"], scale)
+        if filters and digest.has_truth:
             draw(zooms[1], digest.rates["truth"].zoom, colors["truth"], 4.2, scale=scale)
         # Later lines are thinner, so that lines which lie on each other all stay visible.
         for i, group in enumerate(filters):
             draw(zooms[1], digest.rates[group].zoom, colors[group], 2.2 * 0.7**i, scale=scale)
-        commanded = digest.rates["commanded"].zoom
-        middle = scale * (commanded.low + commanded.high) / 2
-        # A command of nothing would only stretch the scale of a table that turns with the Earth.
-        moved = bool(np.any(middle))
-        if moved:
-            zooms[-1].plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
+        moved = _dot_command(zooms[-1], digest, scale)
         above.axvspan(*digest.zoom_s, color=INK, alpha=0.08, linewidth=0)
         span = f"{digest.zoom_s[0]:.4g} s to {digest.zoom_s[1]:.4g} s"
         above.set_title("Sensors, whole run (shaded: the zoom below)", loc="left")
@@ -98,11 +94,27 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
             time_axis(axes, digest.zoom_s[1] - digest.zoom_s[0], named=axes is zooms[-1])
         handles: list[Line2D | Patch] = [
             Line2D([], [], color=colors[group], linewidth=2.2, label=label(group))
-            for group in ["truth", *(group for group in digest.rates if group in {*sensors, *filters})]
+            for group in digest.rates
+            if group != "commanded"
         ]
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
         arrange(figure, [*handles, dotted] if moved else handles, gap_in=0.62)
     return figure
+
+
+def _dot_command(axes: Axes, digest: Digest, scale: float) -> bool:
+    """Draw what was commanded, dotted; return whether there was anything.
+
+    A command of nothing would only stretch the scale of a table that turns with the Earth.
+    """
+    if "commanded" not in digest.rates:
+        return False
+    commanded = digest.rates["commanded"].zoom
+    middle = scale * (commanded.low + commanded.high) / 2
+    if not np.any(middle):
+        return False
+    axes.plot(commanded.time, middle, color=INK, linewidth=0.8, linestyle=DOTTED)
+    return True
 
 
 def _dash_truth(axes: Axes, truth: Envelope, color: str, scale: float) -> None:
@@ -205,7 +217,8 @@ def _cut_note(trace: ErrorTrace, limit: float, unit: Unit) -> str:
 def spectrum_figure(
     digest: Digest, colors: Mapping[str, str], floor: FloorDensity | None, unit: Unit = DEG_S
 ) -> Figure:
-    """Draw the two-sided root density of the errors after settle, and of the noise floor if it is known.
+    """Draw the two-sided root density of the errors after settle, of the rates where there is no truth, and of the
+    noise floor if it is known.
 
     Parameters
     ----------
@@ -257,7 +270,8 @@ def spectrum_figure(
 
 def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel(f"error root density, two-sided [{unit[0]}/√Hz]")
+    of = "error" if digest.has_truth else "rate"
+    axes.set_ylabel(f"{of} root density, two-sided [{unit[0]}/√Hz]")
     axes.xaxis.set_major_locator(LogLocator(numticks=20))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
     axes.xaxis.set_minor_formatter(NullFormatter())

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.pages.numbers import plain, significant
 from testbed.runs.table import error_unit
+from testbed.units import DEG
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from testbed.report.digest import Digest
-    from testbed.runs.metrics import RunMetrics, SourceMetrics
+    from testbed.runs.metrics import FindingMetrics, RunMetrics, SourceMetrics
 
 METRICS = {
     "rmse_deg_s": "RMSE",
@@ -23,9 +24,14 @@ METRICS = {
     "optimum_settled_deg_s": "settled optimum",
     "optimum_ratio": "RMSE / optimum",
     "mean_std_deg_s": "claimed std",
+    "mean_deg_s": "mean",
+    "spread_deg_s": "spread",
 }
 # Columns that are the RMSE over a bound.
 RATIOS = {"ratio": "floor_rmse_deg_s", "optimum_ratio": "optimum_rmse_deg_s"}
+
+# A unit of a finding -> how it is shown: factor and unit.
+_UNITS = {"s": (1e3, "ms"), "rad/s": (1.0 / DEG, "deg/s"), "1": (1.0, "")}
 
 _SHOWN = {*METRICS, "inside_2_std"}
 
@@ -44,13 +50,56 @@ def summary(metrics: RunMetrics, digest: Digest) -> str:
     """Return the paragraph that says what came out: the best filter, against the sensors and the floor, its honesty,
     the expectations.
     """
+    what = "run" if metrics.replay is None else "recording"
     parts = [
-        f"The run lasted {plain(metrics.duration_s)} s; everything is judged from {plain(metrics.settle_s)} s on.",
-        *_accuracy(metrics),
+        f"The {what} lasted {plain(metrics.duration_s)} s; everything is judged from {plain(metrics.settle_s)} s on.",
+        *_stands(metrics),
+        *(_accuracy(metrics) if digest.has_truth else _self_consistency(metrics)),
         *_honesty(metrics, digest),
-        _expectations(metrics),
+        *([_expectations(metrics)] if metrics.replay is None else []),
     ]
     return " ".join(parts)
+
+
+def _stands(metrics: RunMetrics) -> list[str]:
+    """Return what the verdict says of a recording: what stands against it."""
+    if metrics.replay is None:
+        return []
+    standing = [f"{one.kind} of {one.sensor}" for one in metrics.findings if not one.fixed]
+    fixed = [f"{one.kind} of {one.sensor}" for one in metrics.findings if one.fixed]
+    words = [f"Against it stands: {', '.join(standing)}; read every number below in that light."] if standing else []
+    return [*words, *([f"Put right before the filters ran: {', '.join(fixed)}."] if fixed else [])]
+
+
+def _self_consistency(metrics: RunMetrics) -> list[str]:
+    """Return what is said of the filters of a recording without a reference."""
+    parts = ["It has no reference, so no error is known."]
+    for name, source in metrics.fusion.items():
+        verdict = None if source.consistency is None else source.consistency.verdict
+        if verdict == "consistent":
+            parts.append(f"The readings are what {name} expects of them, in size.")
+        elif verdict is not None:
+            parts.append(f"{name}: {verdict}, so its belief does not describe these sensors.")
+    return parts
+
+
+def finding_text(finding: FindingMetrics) -> str:
+    """Return value and interval of a finding with their unit, as a page shows them.
+
+    Parameters
+    ----------
+    finding : FindingMetrics
+        As metrics.json has it, in SI.
+    """
+    factor, unit = (1e6, "ppm") if finding.kind == "rate" else _UNITS.get(finding.unit, (1.0, finding.unit))
+    if finding.value is None:
+        return "—"
+    value = significant(factor * finding.value)
+    if finding.lower is None or finding.upper is None:
+        return f"{value} {unit}".rstrip()
+    return f"{value} {unit} ({significant(factor * finding.lower)} to {significant(factor * finding.upper)})".replace(
+        "  ", " "
+    )
 
 
 def _accuracy(metrics: RunMetrics) -> list[str]:

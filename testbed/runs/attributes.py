@@ -61,24 +61,24 @@ def attributes(group: str, name: str) -> dict[str, str]:
     return found
 
 
-def provenance(scenario: str, seed: int, versions: Mapping[str, str]) -> dict[str, str | int]:
+def provenance(scenario: str, seed: int | None, versions: Mapping[str, str]) -> dict[str, str | int]:
     """Return the global attributes of a run.
 
     Parameters
     ----------
     scenario : str
         Its name.
-    seed : int
-        Of its random streams.
+    seed : int, optional
+        Of its random streams; None of a recording, which has none.
     versions : mapping of str to str
         Of everything that the result depends on.
     """
     return {
         "Conventions": CONVENTIONS,
         "title": scenario,
-        "source": f"testbed {versions['testbed']}, simulation",
+        "source": f"testbed {versions['testbed']}, {'recording' if seed is None else 'simulation'}",
         "scenario": scenario,
-        "seed": seed,
+        **({} if seed is None else {"seed": seed}),
         # A name of CF has no hyphen.
         **{f"{name.replace('-', '_')}_version": version for name, version in versions.items()},
     }

@@ -58,17 +58,59 @@ class RunBlock:
         return self.command.n_time
 
 
-def columns(block: RunBlock, rates: Mapping[str, float]) -> Iterator[tuple[str, str, int, float, FloatArray]]:
+@dataclass(frozen=True)
+class PlayedBlock:
+    """What the filters made of one block of a recording.
+
+    Parameters
+    ----------
+    start, n_time : int
+        First sample of the base clock, which is that of the fastest sensor, and how many there are.
+    first : mapping of str to int
+        Index of the first reading of each sensor in the block.
+    reference : ndarray, shape (n_time,), optional
+        What is taken for the truth [rad/s], NaN where it is not known; None if the recording has none.
+    sensors : mapping
+        Readings [rad/s] by sensor.
+    fusion : mapping
+        Estimates by filter, on the base clock.
+    """
+
+    start: int
+    n_time: int
+    first: Mapping[str, int]
+    reference: FloatArray | None
+    sensors: Mapping[str, FloatArray]
+    fusion: Mapping[str, EstimateBlock]
+
+
+Column = tuple[str, str, int, float, "FloatArray"]
+
+
+def columns(block: RunBlock | PlayedBlock, rates: Mapping[str, float]) -> Iterator[Column]:
     """Yield every signal of a block as (group, name, start index, sample rate [Hz], values): the one list of what a run
     keeps.
 
     Parameters
     ----------
-    block : RunBlock
-        A block of the chain.
+    block : RunBlock or PlayedBlock
+        A block of the chain, or of a recording.
     rates : mapping
         Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
     """
+    yield from _played(block, rates) if isinstance(block, PlayedBlock) else _simulated(block, rates)
+
+
+def _played(block: PlayedBlock, rates: Mapping[str, float]) -> Iterator[Column]:
+    if block.reference is not None:
+        yield "truth", "rate", block.start, rates["base"], block.reference
+    for name, values in block.sensors.items():
+        yield f"sensors/{name}", "rate", block.first[name], rates[name], values
+    for name, estimate in block.fusion.items():
+        yield from _estimated(name, estimate, block.start, rates[name])
+
+
+def _simulated(block: RunBlock, rates: Mapping[str, float]) -> Iterator[Column]:
     base = rates["base"]
     n = block.n_time
     yield "commanded", "rate", block.start, base, block.command.rate[:n]
@@ -84,12 +126,27 @@ def columns(block: RunBlock, rates: Mapping[str, float]) -> Iterator[tuple[str, 
         if name in block.temperatures:
             yield f"sensors/{name}", "temperature", start, rates[name], block.temperatures[name]
     for name, estimate in block.fusion.items():
-        start = first_due(block.start, base, rates[name])
-        for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
-            yield f"fusion/{name}", signal, start, rates[name], values
+        yield from _estimated(name, estimate, first_due(block.start, base, rates[name]), rates[name])
     for name, sight in block.pointing.items():
         for signal in POINTING_SIGNALS:
             yield f"pointing/{name}", signal, block.start, base, getattr(sight, signal)
+
+
+def _estimated(name: str, estimate: EstimateBlock, start: int, rate: float) -> Iterator[Column]:
+    for signal, values in (("rate", estimate.rate), ("std", estimate.std), *estimate.diagnostics.items()):
+        yield f"fusion/{name}", signal, start, rate, values
+
+
+def clock_of(group: str) -> str:
+    """Return whose clock a group of a recording has: that of its sensor, or ``base``, that of filters and reference.
+
+    Parameters
+    ----------
+    group : str
+        Such as ``sensors/mems_gyro``.
+    """
+    kind, _, name = group.partition("/")
+    return name if kind == "sensors" else "base"
 
 
 def first_due(start: int, base_rate_hz: float, sample_rate_hz: float) -> int:

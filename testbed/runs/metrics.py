@@ -73,7 +73,8 @@ class ConsistencyMetrics(Entry):
 class SourceMetrics(Entry):
     """Errors of one sensor or filter [deg/s]; None where undefined. `missing` counts lost readings, `belief` says where
     a filter's is from, `start` what it knew of its start, `gated` how many readings its front part struck out, by
-    sensor, `caution` where it does not hold.
+    sensor, `caution` where it does not hold. Of a recording without reference `mean_deg_s` and `spread_deg_s` are what
+    is read or estimated.
     """
 
     belief: str | None = None
@@ -87,6 +88,8 @@ class SourceMetrics(Entry):
     missing: int | None = None
     mean_std_deg_s: float | None = None
     inside_2_std: float | None = None
+    mean_deg_s: float | None = None
+    spread_deg_s: float | None = None
     floor_rmse_deg_s: float | None = None
     prior_floor_rmse_deg_s: float | None = None
     optimum_rmse_deg_s: float | None = None
@@ -158,6 +161,28 @@ class Budget(Entry):
             return np.asarray(information**-0.5)
 
 
+class Response(Entry):
+    """Gain [-] and phase [deg] at the first of the frequencies that stand beside it: up to half its sample rate."""
+
+    gain: list[float]
+    phase_deg: list[float]
+
+
+class BelievedResponses(Entry):
+    """What some filters were told of the sensors, where that is not what they are."""
+
+    filters: list[str]
+    sensors: dict[str, Response]
+
+
+class Responses(Entry):
+    """Responses of the sensors as they are built against frequency [Hz], and as filters believe them to be."""
+
+    frequency_hz: list[float]
+    sensors: dict[str, Response]
+    beliefs: list[BelievedResponses] = []
+
+
 class PointingBudget(Entry):
     """Who makes the residual: shares of its variance [-], which add up to 1; inside the knowledge by sensor and term.
     Rms of each part, of all, and of all with one of them halved [urad]; `quadrature_urad` is what it is not.
@@ -216,8 +241,75 @@ class PartSetup(Entry):
     differs: list[dict[str, str | None]] = []
 
 
+class ChannelMetrics(Entry):
+    """A channel of a replayed recording: where it stands, how it was read, its clock [Hz, s], how many of its samples
+    were lost, and how many were `dropped` since the filters had no use for them.
+    """
+
+    column: str
+    file: str
+    unit: str | None = None
+    rate_hz: float
+    start_s: float
+    n_time: int
+    missing: int = 0
+    dropped: int = 0
+    notes: list[str] = []
+
+
+class ReplayMetrics(Entry):
+    """What was replayed: the recording, its channels, whether it has a reference and which, and how its clocks go
+    together.
+    """
+
+    log: str
+    format: str
+    reference: bool
+    clock: str
+    channels: dict[str, ChannelMetrics]
+    reference_channel: ChannelMetrics | None = None
+    start_ns: int | None = None
+    notes: list[str] = []
+
+
+class CrossBandMetrics(Entry):
+    """What two sensors share between two frequencies [Hz]: coherence [-], and the second over the first, over what is
+    believed of that: gain [-] and phase [deg], None where they share too little.
+    """
+
+    low_hz: float
+    high_hz: float
+    coherence: float
+    gain_over_belief: float | None = None
+    phase_off_belief_deg: float | None = None
+
+
+class CrossMetrics(Entry):
+    """Two sensors of a recording against each other, by bands."""
+
+    first: str
+    second: str
+    bands: list[CrossBandMetrics] = []
+
+
+class FindingMetrics(Entry):
+    """What the verdict found of a sensor: the value with its interval, what to do, and whether it was put right."""
+
+    kind: str
+    sensor: str
+    value: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    unit: str = ""
+    remedy: str = ""
+    fixed: bool = False
+
+
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
+
+    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it, `cross`
+    what its sensors say of each other; `scenario` is its name, and there is no `seed`.
 
     Examples
     --------
@@ -228,7 +320,7 @@ class RunMetrics(Entry):
     """
 
     scenario: str
-    seed: int
+    seed: int | None
     duration_s: float = Field(gt=0)
     settle_s: float = Field(ge=0)
     bandwidth_hz: float | None = None
@@ -238,8 +330,13 @@ class RunMetrics(Entry):
     bounds_reason: str | None = None
     floor_density: FloorDensity | None = None
     budget: Budget | None = None
+    responses: Responses | None = None
     pointing: dict[str, PointingMetrics] = {}
     expectations: list[Expectation] = []
+    replay: ReplayMetrics | None = None
+    findings: list[FindingMetrics] = []
+    undecided: list[str] = []
+    cross: list[CrossMetrics] = []
     versions: dict[str, Any] = {}
     setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []

@@ -15,15 +15,18 @@ import h5py
 import numpy as np
 
 from testbed.runs.attributes import attributes, is_precise
-from testbed.runs.block import columns
+from testbed.runs.block import clock_of, columns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from testbed.runs.block import RunBlock
+    from testbed.runs.block import PlayedBlock, RunBlock
+    from testbed.signals import FloatArray
 
 _CHUNK = 20_000
+# Attribute of a group whose `time` is no multiple of one step.
+STAMPED = "stamps"
 _PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
@@ -72,6 +75,9 @@ class NetcdfStore:
         Length of the run [s].
     attributes : mapping
         Provenance, written as global attributes.
+    times : mapping of str to ndarray, shape (n_time,), optional
+        Of a recording whose clocks have no whole ratio: the stamps [s] of ``base`` and of every sensor, instead of k /
+        rate.
 
     Raises
     ------
@@ -79,8 +85,15 @@ class NetcdfStore:
         From `write` and `close`, if the disk is full or the file cannot be written.
     """
 
-    def __init__(self, path: Path, rates: Mapping[str, float], duration: float, attributes: Mapping[str, Any]) -> None:
-        self._rates = rates
+    def __init__(
+        self,
+        path: Path,
+        rates: Mapping[str, float],
+        duration: float,
+        attributes: Mapping[str, Any],
+        times: Mapping[str, FloatArray] | None = None,
+    ) -> None:
+        self._rates, self._times = rates, times
         self._n_base = round(duration * rates["base"])
         self._raw = _ShieldedFile(path, "w+")
         self._hdf = h5py.File(self._raw, "w", track_order=True)
@@ -90,7 +103,7 @@ class NetcdfStore:
         for name, value in attributes.items():
             self._file.attrs[name] = value
 
-    def write(self, block: RunBlock) -> None:
+    def write(self, block: RunBlock | PlayedBlock) -> None:
         """Append a block."""
         for group, name, start, rate, values in columns(block, self._rates):
             if (group, name) not in self._datasets:
@@ -108,15 +121,18 @@ class NetcdfStore:
             self._raw.check()
 
     def _create(self, group: str, name: str, rate: float, *, still: bool) -> None:
-        n = -(-self._n_base // round(self._rates["base"] / rate))
+        stamps = None if self._times is None else self._times[clock_of(group)]
+        n = -(-self._n_base // round(self._rates["base"] / rate)) if stamps is None else stamps.size
         node = self._group(group)
         if "time" not in node.variables:
             node.dimensions["time"] = n
             time = self._variable(node, group, "time", n, packed=True)
             for start in range(0, n, _CHUNK):
                 stop = min(start + _CHUNK, n)
-                time[start:stop] = np.arange(start, stop) / rate
+                time[start:stop] = np.arange(start, stop) / rate if stamps is None else stamps[start:stop]
             node.attrs["sample_rate_hz"] = rate
+            if stamps is not None:
+                node.attrs[STAMPED] = "as recorded"
         self._datasets[group, name] = self._variable(node, group, name, n, packed=still or not is_precise(name))
 
     def _group(self, path: str) -> Any:

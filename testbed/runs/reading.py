@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from testbed.errors import Problem, ScenarioError
+from testbed.runs.netcdf import STAMPED
 from testbed.runs.signals import Signals
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ def read_groups(path: Path) -> dict[str, Signals]:
             for key in units:
                 if node[key].shape != (n_time,):
                     raise _bad(path, f"{name}/{key}", f"expected {n_time} samples along time, got {node[key].shape}")
-            groups[name] = Signals(units, _sample_rate(path, f"{name}/time", node), n_time, _InFile(path, name))
+            rate, stamped = _sample_rate(path, f"{name}/time", node), STAMPED in node.attrs
+            groups[name] = Signals(units, rate, n_time, _InFile(path, name), stamped=stamped)
     return groups
 
 
@@ -86,12 +88,16 @@ def _is_signal(item: Any) -> bool:
 
 
 def _sample_rate(path: Path, key: str, node: Any) -> float:
-    """Return the rate that the group states, held against its time; of a file that states none, that of its time."""
+    """Return the rate that the group states, held against its time, unless that is stamps of a recording; of a file
+    that states none, that of its time.
+    """
     time, stated = node["time"], node.attrs.get("sample_rate_hz")
     n = int(time.shape[0])
     if n < (1 if stated is not None else 2):
         raise _bad(path, key, f"expected samples, and two of them or their sample_rate_hz, got {n}")
     first, last = float(time[0]), float(time[-1])
+    if STAMPED in node.attrs:
+        return float(np.ravel(stated)[0])
     if first != 0.0 or not (last > 0.0 or n == 1):
         raise _bad(path, key, f"expected time from 0 s on, increasing, got {first} s to {last} s")
     rate = (n - 1) / last if stated is None else float(np.ravel(stated)[0])

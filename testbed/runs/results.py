@@ -10,7 +10,7 @@ import numpy as np
 
 from testbed.errors import Problem, ScenarioError
 from testbed.runs.attributes import unit_of
-from testbed.runs.block import columns
+from testbed.runs.block import clock_of, columns
 from testbed.runs.folder import ESSENTIAL, SIGNALS
 from testbed.runs.leftovers import heal
 from testbed.runs.metrics import RunMetrics, read_metrics
@@ -21,7 +21,7 @@ from testbed.runs.signals import NONE, Signals, kept
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from testbed.runs.block import RunBlock
+    from testbed.runs.block import PlayedBlock, RunBlock
     from testbed.signals import FloatArray
 
 
@@ -31,7 +31,8 @@ class RunRecord:
 
     `commanded` and `truth` are on the base clock, each sensor of `sensors` on its own, each filter of `fusion` on that
     of its fastest sensor; `pointing` has, by filter, what is left of the line of sight. `metrics` is what metrics.json
-    holds; `folder` is where the run is stored, None if it is in memory only.
+    holds; `folder` is where the run is stored, None if it is in memory only. Of a replayed recording `commanded` is
+    empty, and `truth` is its reference, empty if there is none.
     """
 
     commanded: Signals
@@ -52,8 +53,8 @@ class RunRecord:
             }
 
         return cls(
-            groups["commanded"],
-            groups["truth"],
+            groups.get("commanded", NONE),
+            groups.get("truth", NONE),
             below("sensors/"),
             below("fusion/"),
             metrics,
@@ -89,7 +90,7 @@ class RunRecord:
             problem = f"expected a run folder, but {', '.join(str(Path(folder) / name) for name in missing)} is missing"
             raise ScenarioError([Problem(problem, file=str(folder))])
         metrics, groups = read_metrics(path / "metrics.json"), read_groups(path / SIGNALS)
-        for group in ("commanded", "truth"):
+        for group in () if metrics.replay else ("commanded", "truth"):
             if group not in groups:
                 raise ScenarioError([Problem("expected this group, got none", group, str(path / "run.nc"))])
         return cls.of(groups, metrics, path)
@@ -98,8 +99,7 @@ class RunRecord:
     def groups(self) -> dict[str, Signals]:
         """Every group of signals by its path in run.nc, such as ``fusion/kalman``."""
         return {
-            "commanded": self.commanded,
-            "truth": self.truth,
+            **{name: one for name, one in (("commanded", self.commanded), ("truth", self.truth)) if one.n_time},
             **{f"sensors/{name}": signals for name, signals in self.sensors.items()},
             **{f"fusion/{name}": signals for name, signals in self.fusion.items()},
             **{f"pointing/{name}": signals for name, signals in self.pointing.items()},
@@ -109,7 +109,8 @@ class RunRecord:
         known = {name: source.rmse_deg_s for name, source in self.metrics.fusion.items()}
         errors = [f"{name} {'undefined' if rmse is None else f'{rmse:.4g} deg/s'}" for name, rmse in known.items()]
         place = [] if self.folder is None else [str(self.folder)]
-        head = f"{self.metrics.scenario}, {self.metrics.duration_s:g} s, seed {self.metrics.seed}"
+        made = "replayed" if self.metrics.seed is None else f"seed {self.metrics.seed}"
+        head = f"{self.metrics.scenario}, {self.metrics.duration_s:g} s, {made}"
         return f"<Run {'; '.join([head, *([', '.join(errors)] if errors else []), *place])}>"
 
 
@@ -120,14 +121,16 @@ class MemoryStore:
     ----------
     rates : mapping
         Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
+    times : mapping of str to ndarray, shape (n_time,), optional
+        As for `NetcdfStore`.
     """
 
-    def __init__(self, rates: Mapping[str, float]) -> None:
-        self._rates = rates
+    def __init__(self, rates: Mapping[str, float], times: Mapping[str, FloatArray] | None = None) -> None:
+        self._rates, self._times = rates, times
         self._parts: dict[str, dict[str, list[FloatArray]]] = {}
         self._rate_of: dict[str, float] = {}
 
-    def write(self, block: RunBlock) -> None:
+    def write(self, block: RunBlock | PlayedBlock) -> None:
         """Keep a block."""
         for group, name, _, rate, values in columns(block, self._rates):
             self._parts.setdefault(group, {}).setdefault(name, []).append(values)
@@ -139,4 +142,5 @@ class MemoryStore:
 
     def _signals(self, group: str) -> Signals:
         arrays = {name: np.concatenate(parts) for name, parts in self._parts[group].items()}
-        return kept(arrays, {name: unit_of(name) for name in arrays}, self._rate_of[group])
+        stamps = None if self._times is None else self._times[clock_of(group)]
+        return kept(arrays, {name: unit_of(name) for name in arrays}, self._rate_of[group], stamps)

@@ -35,6 +35,8 @@ class Signals(Mapping[str, "FloatArray"]):
         Number of samples.
     source : callable
         (name, rows) -> samples.
+    stamped : bool, optional
+        Whether `time` is stamps of a recording, and no multiple of one step.
 
     Examples
     --------
@@ -47,8 +49,10 @@ class Signals(Mapping[str, "FloatArray"]):
     'rad/s'
     """
 
-    def __init__(self, units: Mapping[str, str], sample_rate_hz: float, n_time: int, source: Source) -> None:
-        self.units, self.sample_rate_hz, self.n_time = dict(units), sample_rate_hz, n_time
+    def __init__(
+        self, units: Mapping[str, str], sample_rate_hz: float, n_time: int, source: Source, *, stamped: bool = False
+    ) -> None:
+        self.units, self.sample_rate_hz, self.n_time, self.stamped = dict(units), sample_rate_hz, n_time, stamped
         self._source = source
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
@@ -110,7 +114,12 @@ class _Kept:
         return _Kept, (self._arrays,)
 
 
-def kept(arrays: Mapping[str, FloatArray], units: Mapping[str, str], sample_rate_hz: float) -> Signals:
+def kept(
+    arrays: Mapping[str, FloatArray],
+    units: Mapping[str, str],
+    sample_rate_hz: float,
+    stamps: FloatArray | None = None,
+) -> Signals:
     """Return the group made of arrays in memory, with the coordinate `time` [s] from zero on.
 
     Parameters
@@ -121,13 +130,16 @@ def kept(arrays: Mapping[str, FloatArray], units: Mapping[str, str], sample_rate
         Of each array.
     sample_rate_hz : float
         Rate of the samples [Hz].
+    stamps : ndarray, shape (n_time,), optional
+        When they were taken, instead of multiples of one step [s].
     """
     n_time = next(iter(arrays.values())).size
     return Signals(
         {"time": "s"} | {name: units[name] for name in arrays},
         sample_rate_hz,
         n_time,
-        _Kept({"time": np.arange(n_time) / sample_rate_hz, **arrays}),
+        _Kept({"time": np.arange(n_time) / sample_rate_hz if stamps is None else stamps, **arrays}),
+        stamped=stamps is not None,
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from testbed.runs.metrics import RunMetrics, SourceMetrics
 
-HEADINGS = ("RMSE", "aligned", "claimed std", "x floor", "x optimum")
+HEADINGS = ("RMSE", "aligned", "claimed std", "x floor", "x optimum", "mean", "spread")
 NOTHING = "-"
 # A tenth of the Earth's rate [deg/s].
 _SLOW = 1.5 / 3600.0
@@ -18,16 +18,19 @@ _RESOLUTION = 1e-12
 def error_title(metrics: RunMetrics) -> str:
     """Return what the table shows: scenario, unit, span and seed."""
     unit, _ = error_unit(metrics)
-    span = f"{metrics.settle_s:g} s to {metrics.duration_s:g} s"
-    return f"{metrics.scenario}: error against the truth in {unit}, {span}, seed {metrics.seed}"
+    span = f"{metrics.settle_s:.6g} s to {metrics.duration_s:.6g} s"
+    if metrics.replay is None:
+        return f"{metrics.scenario}: error against the truth in {unit}, {span}, seed {metrics.seed}"
+    shown = "error against the reference" if metrics.replay.reference else "mean and spread (there is no reference)"
+    return f"{metrics.scenario}, replayed: {shown} in {unit}, {span}"
 
 
 def error_unit(metrics: RunMetrics) -> tuple[str, float]:
     """Return the unit of every rate that is shown of a run and what deg/s is multiplied by for it: deg/h where all
     errors are below a tenth of the Earth's rate.
     """
-    errors = [source.rmse_deg_s for source in (*metrics.sensors.values(), *metrics.fusion.values())]
-    known = [error for error in errors if error is not None]
+    sources = (*metrics.sensors.values(), *metrics.fusion.values())
+    known = [one for source in sources for one in [source.rmse_deg_s or source.spread_deg_s] if one is not None]
     return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
 
 
@@ -43,8 +46,12 @@ def error_cells(source: SourceMetrics, scale: float) -> list[str]:
     """
     errors = (source.rmse_deg_s, source.rmse_aligned_deg_s, source.mean_std_deg_s)
     ratios = (source.over(source.floor_rmse_deg_s), source.over(source.optimum_rmse_deg_s))
-    cells = [number(None if error is None else scale * error) for error in errors]
-    return cells + [NOTHING if ratio is None else f"{ratio:.1f}" for ratio in ratios]
+
+    def shown(rates: tuple[float | None, ...]) -> list[str]:
+        return [number(None if rate is None else scale * rate) for rate in rates]
+
+    over = [NOTHING if ratio is None else f"{ratio:.1f}" for ratio in ratios]
+    return [*shown(errors), *over, *shown((source.mean_deg_s, source.spread_deg_s))]
 
 
 def number(value: float | None) -> str:

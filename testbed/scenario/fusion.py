@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
 
 _REMEDY = "write 'belief: exact' for the simulator's own response and noise, or what is believed of it"
+_OF_RECORDING = (
+    "name the channels of the recording as the belief does, leave out those that are no sensors, or write what is "
+    "believed of it"
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class Fusion:
         What carries them, which rests at t = 0.
     at_rest : bool
         Whether the filters see that: their first readings are those of t = 0.
+    simulated : bool, optional
+        Whether the sensors are instruments of the simulator, of which it knows what they exactly are.
     """
 
     intake: Intake
@@ -51,6 +57,7 @@ class Fusion:
     data_sheets: Mapping[str, SensorBelief | None]
     turntable: TurntableParameters | None
     at_rest: bool
+    simulated: bool = True
 
     def read(self, data: Any) -> dict[str, FilterSpec]:
         """Return the filters by name; what is wrong with the others is noted."""
@@ -107,7 +114,7 @@ class Fusion:
         """Return what a filter believes of each sensor; None, with the findings noted, if not of all."""
         if written is None:
             return self._of_presets(key)
-        if written == EXACT:
+        if written == EXACT and self.simulated:
             return self._exact(key)
         known = self._named(written, key)
         return None if known is None else self._of_types(known, key)
@@ -138,7 +145,7 @@ class Fusion:
             one = known.get(name, known.get(kind))
             if one is None:
                 words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
-                self._find(key, f"{words}; {_REMEDY}")
+                self._find(key, f"{words}; {_REMEDY if self.simulated else _OF_RECORDING}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None
@@ -150,7 +157,7 @@ class Fusion:
         if isinstance(written, str):
             try:
                 return load_belief(written)
-            except UnknownNameError as error:
+            except ValueError as error:
                 self._find(key, str(error))
                 return None
         if not isinstance(written, dict):

@@ -331,10 +331,7 @@ class Scenario:
             "sensors": {
                 name: {"type": self.sensor_types[name], **dump(sensor)} for name, sensor in self.sensors.items()
             },
-            "fusion": {
-                name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)}
-                for name, spec in self.fusion.items()
-            },
+            "fusion": resolved_fusion(self.fusion),
             **({} if self.pointing is None else {"pointing": dump(self.pointing)}),
             "expect": _expectations(self.expect),
         }
@@ -361,6 +358,17 @@ def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
     written = part.model_dump(mode="json", context={"border": True, "folder": folder})
     fields = type(part).model_fields
     return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
+
+
+def resolved_fusion(specs: Mapping[str, FilterSpec]) -> dict[str, Any]:
+    """Return the part `fusion` of a scenario or a replay as a mapping with SI units, which loads to the same again.
+
+    Parameters
+    ----------
+    specs : mapping of str to FilterSpec
+        The filters.
+    """
+    return {name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)} for name, spec in specs.items()}
 
 
 def _belief(spec: FilterSpec) -> dict[str, Any] | str:

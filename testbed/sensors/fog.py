@@ -14,7 +14,7 @@ from testbed.sensors.data_sheet import GYRO_WORDS, Word
 from testbed.sensors.gyro_errors import GainError
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
-from testbed.signals import BASE_RATE_HZ, LinearFilter, transfer
+from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
 from testbed.units import Frequency, PositiveDuration, Quantity, Range, RatioPerKelvin
 
 if TYPE_CHECKING:
@@ -169,14 +169,14 @@ class FogStage:
     """A fibre-optic gyro in time; made by `Fog.start`.
 
     `temperature` holds the thermometer's readings of the last block [K], at the instants of the rate; `drift` the
-    thermal bias as its axis feels it [rad/s], at the input's clock.
+    thermal bias as its axis feels it [rad/s], at the input's clock. Coefficients that scatter are those of the seed,
+    with noise and without: it says which cycle this is.
     """
-
-    separable = True
 
     def __init__(self, fog: Fog, input_rate_hz: float, seed: int, name: str) -> None:
         self._fog, self._ratio = fog, rate_ratio(input_rate_hz, fog.sample_rate)
-        self._thermal = fog.thermal.start(input_rate_hz)
+        self.separable = not fog.thermal.scatter
+        self._thermal = fog.thermal.drawn(random_stream(seed, name, "scatter")).start(input_rate_hz)
         self._thermometer = Settled(LinearFilter([1.0], [fog.thermometer.lag, 1.0], input_rate_hz))
         numerator, denominator = fog.transfer_function
         self._low_pass = Settled(LinearFilter(list(numerator), list(denominator), input_rate_hz))

@@ -29,7 +29,8 @@ COMMANDS = dict(leaves(typer.main.get_command(app)))
 def documented() -> dict[str, set[str]]:
     """Return what docs/commands.md says are the keys of each command's document."""
     page = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `(testbed [^`]*)` \| (.*) \|$", page, flags=re.MULTILINE)
+    section = page.split("## Documents of `--json`")[1]
+    rows = re.findall(r"^\| `(testbed [^`]*)` \| (.*) \|$", section, flags=re.MULTILINE)
     # What is said in brackets is inside of a value.
     return {words: set(re.findall(r"`([^`]*)`", re.sub(r"\([^)]*\)", "", keys))) for words, keys in rows}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -193,6 +194,18 @@ def test_extrapolation_is_flagged(models):
     flagged = models["gradient"].apply(hot).extrapolated
     assert flagged[seen.temperature > seen.temperature.max() - 4.0].all()
     assert not flagged[:7200].any()
+
+
+def test_another_start_is_told_by_its_distance_from_the_nearest_of_training(models):
+    """Both cycles of training start at 20 degC; nothing of the temperatures is outside what was trained on."""
+    seen = cycle("up", 5).record
+    model = models["gradient"]
+    assert model.starts == pytest.approx([293.15, 293.15], abs=0.0625)
+    assert model.start_distance(seen) == 0.0
+    late = slice(7200 + 18_000, None)  # 30 K up the ramp, a lag of 900 s behind
+    other = GyroRecord(seen.rate[late], seen.temperature[late], 1.0)
+    assert model.start_distance(other) == pytest.approx(28.5, abs=0.1)
+    assert replace(model, starts=(293.15, 325.0)).start_distance(other) == pytest.approx(325.0 - 321.65, abs=0.1)
 
 
 def test_the_machine_far_outside_falls_back_to_its_bias_and_says_so(models):

@@ -31,7 +31,7 @@ def readings():
 
 
 def estimated(name, spoilt):
-    return estimate(named(name), spoilt, sample_rate_hz=RATES, **from_rest(name))
+    return estimate(named(name), spoilt, sample_rate_hz=RATES, verdict=False, **from_rest(name))
 
 
 @functools.cache

@@ -30,7 +30,7 @@ def clean() -> tuple[FloatArray, dict[str, FloatArray]]:
 
 
 def run(name: str, readings: dict[str, FloatArray], **parameters: object):
-    return estimate(named(name), readings, sample_rate_hz=RATES, belief="identified", **parameters)
+    return estimate(named(name), readings, sample_rate_hz=RATES, belief="identified", verdict=False, **parameters)
 
 
 def lost(which: str, gap: float | str, place: str, seconds: float) -> dict[str, FloatArray]:

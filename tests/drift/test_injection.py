@@ -66,6 +66,15 @@ def test_earth_turns_show_the_vertical_component_once_up_and_once_down():
     np.testing.assert_array_equal(np.sign(stations[:, 0]), [1, 0, -1, 0, 1, 0, -1, 0])
 
 
+def test_what_follows_the_temperature_is_a_line_in_it():
+    heat = 300.0 + np.random.default_rng(4).standard_normal(1000)
+    rate = injection.heat_rate(heat, 2e-7)
+    # The mean of temperatures of 300 K is known to eps * 300 K.
+    assert rate.mean() == pytest.approx(0.0, abs=1e-18)
+    assert rate.std() == pytest.approx(2e-7, rel=1e-12, abs=0.0)
+    assert np.corrcoef(rate, heat)[0, 1] == pytest.approx(1.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_the_cutoff_of_a_low_pass_is_found_between_the_lines(order):
     corner = 1.0 / 150.0

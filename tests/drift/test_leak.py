@@ -44,6 +44,8 @@ def test_removing_the_true_drift_passes_with_every_rate_intact(cycle):
     np.testing.assert_allclose([line.gain for line in found.gains], 1.0, rtol=1e-9)
     assert found.step_gain == pytest.approx(1.0, rel=1e-9)
     assert found.earth_gain == pytest.approx(1.0, rel=1e-9)
+    assert found.heat_gain == pytest.approx(1.0, rel=1e-9)
+    assert found.passed
 
 
 def test_learning_the_record_as_a_function_of_time_is_a_leak(cycle):
@@ -72,6 +74,8 @@ def test_a_low_pass_is_no_leak_but_its_coefficients_are_withheld(cycle):
     record, drift = cycle
     found = examine(lambda of: smoothed(of.rate, FS, 1.0 / 100.0), record, drift)
     assert found.leaks == ()
+    # The drift is still there, so it is no compensation either.
+    assert len(found.excess) == 1
     assert found.after.fit is None
     assert found.before.fit is not None
     assert found.bandwidth_hz == pytest.approx(1.0 / 100.0, rel=0.1)
@@ -84,16 +88,22 @@ def test_half_of_the_rate_is_a_leak_everywhere(cycle):
 
 
 def test_the_limits_are_those_of_the_contract(cycle):
-    """Nine tenths of every slow rate, and seven tenths of the oracle's Allan deviation at 1 h."""
+    """Nine tenths of every slow rate, seven tenths of the oracle's Allan deviation at 1 h, seven tenths to twice its
+    100 s means.
+    """
     record, drift = cycle
     assert not examine(lambda of: 0.901 * of.rate, record).leaks
     low = examine(lambda of: 0.899 * of.rate, record)
-    # Five sines from 900 s on (1000, 2000, 3600, 7200, 21600 s), the step and the Earth.
-    assert len(low.leaks) == 7
+    # Five sines from 900 s on (1000, 2000, 3600, 7200, 21600 s), the step, the Earth and what follows temperature.
+    assert len(low.leaks) == 8
     found = examine(lambda of: of.rate - drift, record, drift)
     for ratio, n_leak in ((0.699, 1), (0.701, 0)):
         after = replace(found.after, hour_deviation=ratio * found.oracle.hour_deviation)
         assert len(replace(found, after=after).leaks) == n_leak
+    for ratio, n_leak, n_excess in ((0.699, 1, 0), (0.701, 0, 0), (1.999, 0, 0), (2.001, 0, 1)):
+        changed = replace(found, after=replace(found.after, block_std=ratio * found.oracle.block_std))
+        assert (len(changed.leaks), len(changed.excess)) == (n_leak, n_excess)
+        assert changed.passed is not bool(n_leak or n_excess)
     assert replace(found, seen=True).leaks == ("the model was trained on this very record: audit it on another cycle",)
 
 
@@ -123,7 +133,7 @@ def test_the_audit_says_what_it_is_doing(cycle):
     record, _ = cycle
     said = []
     examine(lambda of: of.rate, record, tell=said.append)
-    assert len(said) == 4
+    assert len(said) == 5
 
 
 def test_a_compensation_that_fails_on_a_true_rate_is_refused(cycle):

@@ -51,7 +51,7 @@ def leaking(of):
 def results():
     drift = record().drift
     return {
-        "smooth": audited(smooth, extrapolated=0.125, trained_on=("<u>up</u>", "down")),
+        "smooth": audited(smooth, extrapolated=0.125, start_distance=12.5, trained_on=("<u>up</u>", "down")),
         "leaking": audited(leaking),
         "oracle": audited(lambda of: of.rate - drift),
         "no truth": audited(leaking, truth=False),
@@ -122,6 +122,7 @@ def test_the_numbers_of_the_page_are_those_of_the_json(folders, name):
         ("least_gain_in_drift_band", "least gain of a slow true rate"),
         ("step_gain", "gain of a step of true rate"),
         ("earth_rate_gain", "gain of Earth-rate steps"),
+        ("temperature_rate_gain", "gain of a true rate that follows temperature"),
         ("bandwidth_hz", "bandwidth left [Hz]"),
     ):
         expected = [] if key == "bandwidth_hz" and found[key] is None else [found[key]]
@@ -131,6 +132,11 @@ def test_the_numbers_of_the_page_are_those_of_the_json(folders, name):
     assert rows["paper 3, Table 2: paper's pipeline"] == [7.2110e-6, 1.1504e-4]
     share = rows.get("samples flagged as outside the trained temperatures and slopes [%]")
     assert share == ([12.5] if name == "smooth" else None)
+    far = "from its first temperature to the nearest start of a training cycle [K]"
+    assert rows.get(f"{far}: too far, its first hours are compensated worse") == share
+    assert (found["start_distance_k"], found["starts_elsewhere"]) == (
+        (12.5, True) if name == "smooth" else (None, None)
+    )
 
 
 def test_what_is_unknown_or_infinite_is_null(folders, results):
@@ -152,12 +158,20 @@ def test_what_is_unknown_or_infinite_is_null(folders, results):
 
 
 def test_the_verdict_stands_on_page_and_in_json(folders):
-    for name, passed in (("smooth", True), ("oracle", True), ("leaking", False), ("no truth", False)):
+    sentences = {
+        "oracle": "No leak was found: slow true rate survives",
+        "smooth": "No leak was found, but this is no compensation of the drift",
+        "leaking": "This result is a leak",
+        "no truth": "This result is a leak",
+    }
+    for name, sentence in sentences.items():
         found, page = loaded(folders[name]), (folders[name] / "audit.html").read_text()
-        assert found["passed"] is passed
-        assert ("No leak was found" in page) is passed
-        assert ("This result is a leak" in page) is not passed
-        assert all(leak in page for leak in found["leaks"])
+        assert found["passed"] is (name == "oracle")
+        assert bool(found["excess"]) is (name == "smooth")
+        assert bool(found["leaks"]) is (name in {"leaking", "no truth"})
+        for other in set(sentences.values()):
+            assert (other in page) is (other == sentence)
+        assert all(finding in page for finding in found["leaks"] + found["excess"])
 
 
 def test_names_are_escaped(folders):
@@ -214,6 +228,7 @@ def test_the_gains_are_drawn_and_the_low_pass_is_3_db_down_at_its_bandwidth(resu
     assert np.interp(1.0 / found.bandwidth_hz, period, gain) == pytest.approx(np.sqrt(0.5), abs=0.01)
     np.testing.assert_array_equal(lines["step"][:, 1], found.step_gain)
     np.testing.assert_array_equal(lines["Earth-rate steps"][:, 1], found.earth_gain)
+    np.testing.assert_array_equal(lines["rate that follows T"][:, 1], found.heat_gain)
 
 
 def test_a_curve_without_coefficients_is_drawn_without_a_fit(results):

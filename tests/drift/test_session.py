@@ -134,6 +134,27 @@ def test_each_command_says_its_result_to_a_program(cycles, model, tmp_path):
     assert found == {**json.loads((tmp_path / "audit" / "audit.json").read_text()), "written": str(tmp_path / "audit")}
 
 
+@pytest.mark.parametrize(("first", "elsewhere"), [(0, False), (1800, True)])
+def test_another_start_temperature_is_flagged(table, model, tmp_path, first, elsewhere):
+    """From the middle of the first ramp on the gyro is 15 K warmer than where its cycles of training began."""
+    rows = table.read_text().splitlines()
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([rows[0], *rows[1 + first :]]))
+    options = ["--rate", "0.1 Hz", "--out", str(tmp_path / "out")]
+    for command in ("apply", "audit"):
+        result = CliRunner().invoke(
+            app, ["compensate", command, str(model), str(path), *options[:3], f"{options[3]}_{command}"]
+        )
+        assert result.exit_code == 0, result.output
+        said = "from the nearest start of a training cycle: its first hours are compensated worse"
+        assert (said in " ".join(result.output.split())) is elsewhere
+    found = json.loads((tmp_path / "out_audit" / "audit.json").read_text())
+    assert found["starts_elsewhere"] is elsewhere
+    # 10,800 s of 0.1 K/min, 1.5 K behind.
+    assert found["start_distance_k"] == pytest.approx(16.5 if first else 0.0, abs=0.1)
+    assert found["extrapolated"] == 0.0
+
+
 def test_the_audit_of_a_frozen_model_passes_and_reduces_the_drift(cycles, model, tmp_path):
     """Median targets of one command: the drift is at least six times smaller after two cycles, every rate intact."""
     place = tmp_path / "audit"
@@ -190,7 +211,7 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         def __init__(self, record):
             self.rate = record.rate - smoothed(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
 
-    monkeypatch.setattr("testbed.drift.session.paper3.compensate", Result)
+    monkeypatch.setattr("testbed.compensation.paper3.compensate", Result)
     status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path / "audit"], monkeypatch, capsys)
     assert status == 1
     assert "LEAK: of a true rate with a period of 21600 s only" in text

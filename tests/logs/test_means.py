@@ -11,6 +11,7 @@ from testbed.allan import allan_deviation
 from testbed.errors import ScenarioError
 from testbed.judging.allan_records import read
 from testbed.logs import keeping, read_log
+from testbed.logs.formats import open_table
 from testbed.logs.means import Means, Places
 from testbed.logs.selection import Selection
 from tests.cli.test_app import call
@@ -89,6 +90,27 @@ def test_the_command_says_that_these_are_means(tmp_path):
     found = json.loads(call("allan", path, "--average", "8", "--json", cwd=tmp_path).stdout)
     assert found["records"][0]["n_time"] == 499
     assert "means of 8 samples of 1000 Hz" in found["records"][0]["remarks"]
+
+
+def test_a_recording_that_memory_should_not_hold_is_averaged_and_says_so(tmp_path, monkeypatch):
+    path = log(tmp_path, SECONDS, DEG)
+    (whole,) = read(path, Selection())
+    monkeypatch.setattr(keeping, "MOST_WHOLE", 3000)
+    monkeypatch.setattr(keeping, "_MEANS", 300)
+    (found,) = read(path, Selection())
+    # 4000 samples, in at most 300 means of a power of 2: of 16.
+    np.testing.assert_array_equal(found.rate, read(path, Selection(average=16))[0].rate)
+    assert "means of 16 are kept; --average 1 keeps all" in found.content
+    np.testing.assert_array_equal(read(path, Selection(average=1))[0].rate, whole.rate)
+    assert read_log(path).channels["w"].values.size == whole.rate.size, "the library averages nothing by itself"
+
+
+@pytest.mark.parametrize("head", ["t,w [deg/s]\n", "t,w [deg/s]\r\n"])
+def test_the_number_of_rows_of_a_text_is_told_from_its_beginning(tmp_path, head):
+    path = tmp_path / "log.csv"
+    n_time, end = 40_000, head.removeprefix("t,w [deg/s]")
+    path.write_bytes((head + "".join(f"{k:08d},{k % 7}{end}" for k in range(n_time))).encode())
+    assert open_table(path).columns[1].about == pytest.approx(n_time, rel=0.01)
 
 
 @pytest.mark.parametrize(("average", "message"), [(0, "from 1 on, got 0"), (2000, "at least 4 means of 2000 samples")])

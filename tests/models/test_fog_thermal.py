@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from testbed.models.fog_thermal import FogThermal, advance_thermal
+from testbed.models.fog_thermal import COEFFICIENTS, FogThermal, advance_thermal
 
 T0 = 293.15
 FULL = FogThermal(
@@ -238,3 +238,27 @@ def test_terms_alone_over_the_papers_oven() -> None:
     # sides.
     np.testing.assert_allclose(sum(alone.values()), model.bias(oven, 1.0), rtol=0, atol=1e-18)
     assert np.rad2deg(np.ptp(alone["hysteresis"])) * 3600.0 == pytest.approx(0.04, rel=1e-6)
+
+
+def test_coefficients_scatter_by_themselves_and_by_what_is_said() -> None:
+    """Two hundred cycles: each mean is the coefficient, each relative std the scatter, no two go together."""
+    model, n = FULL.model_copy(update={"scatter": 0.1}), 200
+    drawn = [model.drawn(np.random.default_rng(seed)) for seed in range(n)]
+    names = COEFFICIENTS[:-1]
+    true = np.array([*(getattr(FULL, name) for name in names), *FULL.hysteresis])
+    relative = np.array([[*(getattr(one, name) for name in names), *one.hysteresis] for one in drawn]) / true - 1.0
+    # Four sigma over eight coefficients: sigma of a mean is 0.1/sqrt(n), of a std 0.1/sqrt(2 n), of a correlation
+    # 1/sqrt(n).
+    assert np.abs(relative.mean(axis=0)).max() < 0.4 / n**0.5
+    assert np.abs(relative.std(axis=0) - 0.1).max() < 0.4 / (2 * n) ** 0.5
+    assert np.abs(np.corrcoef(relative.T) - np.eye(8)).max() < 4.0 / n**0.5
+    assert {one.scatter for one in drawn} == {0.0}
+    assert {(one.coil_lag, one.half_width, one.reference_temperature) for one in drawn} == {
+        (FULL.coil_lag, FULL.half_width, FULL.reference_temperature)
+    }
+
+
+def test_without_scatter_nothing_is_drawn() -> None:
+    rng = np.random.default_rng(1)
+    assert FULL.drawn(rng) is FULL
+    assert rng.random() == np.random.default_rng(1).random()

@@ -26,7 +26,9 @@ def test_every_path_and_link_exists(page):
     named = re.findall(rf"`((?:{TOP_FOLDERS})/[\w./*-]*)`", text)
     missing = [name for name in named if not any(ROOT.glob(name.rstrip("/")))]
     links = re.findall(r"\]\((?!https?:)([^)#\s]+)", text)
-    assert [*missing, *(link for link in links if not (page.parent / link).exists())] == []
+    # What docs/generated.py writes is there once the site is built.
+    written = [link for link in links if "reference/generated/" not in link]
+    assert [*missing, *(link for link in written if not (page.parent / link).exists())] == []
 
 
 # The recipes of CONTRIBUTING.md make names that are not there before; test_contributing.py follows them.

@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import testbed
+
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
-PAGES = [*TUTORIALS, ROOT / "docs" / "howto.md", ROOT / "docs" / "reference" / "run_folder.md"]
+FOLDER = ROOT / "docs" / "reference" / "run_folder.md"
+PAGES = [*TUTORIALS, ROOT / "docs" / "howto.md", ROOT / "docs" / "replay.md", FOLDER]
+SHORT = {
+    "name": "short",
+    "duration": "0.4 s",
+    "settle": "0.2 s",
+    "turntable": {"engine": "modal"},
+    "motion": [{"sine": {"frequency": "10 Hz", "rate": "1 deg/s"}}],
+    "sensors": {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}},
+    "fusion": {"kalman": {}},
+}
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -36,7 +50,7 @@ def test_what_it_tells_to_type_works(page, tmp_path, monkeypatch, capsys):
 
 def commands(text):
     for line in text.splitlines():
-        word, *arguments = line.split()
+        word, *arguments = shlex.split(line)
         # What installs is tried by whoever clones the repository.
         if word != "make":
             assert word == "testbed"
@@ -45,7 +59,21 @@ def commands(text):
             assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
-def test_there_are_three_of_them_and_each_has_code():
-    assert {"first_run", "data_sheet", "own_log"} <= {page.stem for page in TUTORIALS}
+@pytest.mark.slow
+def test_octave_reads_a_run_as_the_page_tells(tmp_path):
+    octave = shutil.which("octave-cli")
+    if octave is None:
+        pytest.skip("octave is not installed (Debian: octave octave-netcdf)")
+    (text,) = (text for kind, text in FENCE.findall(FOLDER.read_text(encoding="utf-8")) if kind == "octave")
+    run = testbed.run(SHORT, out=tmp_path / "ten")
+    (tmp_path / "read.m").write_text(text.replace("time >= 10", "time >= 0.2"), encoding="utf-8")
+    done = subprocess.run([octave, "read.m"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    if "netcdf" in done.stderr and "not found" in done.stderr:
+        pytest.skip(f"octave has no package netcdf (Debian: octave-netcdf): {done.stderr.strip()}")
+    assert f"rmse {run.metrics.fusion['kalman'].rmse_deg_s:.6f} deg/s" in done.stdout, done.stderr
+
+
+def test_there_are_five_of_them_and_each_has_code():
+    assert {"first_run", "data_sheet", "own_log", "campaign", "link"} <= {page.stem for page in TUTORIALS}
     for page in TUTORIALS:
         assert {"sh", "python"} <= {kind for kind, _ in FENCE.findall(page.read_text(encoding="utf-8"))}

@@ -10,7 +10,8 @@ from ruamel.yaml import YAML
 
 import testbed
 from testbed.fusion import estimate
-from testbed.fusion.belief import load_belief
+from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.parts import preset as preset_of
 from testbed.parts import preset_names
 from testbed.scenario.beliefs import belief_of, believed, exact_belief
 from testbed.scenario.loader import load_scenario
@@ -25,13 +26,14 @@ SUPPORTED = {
     "adis16505": "adis16505",
     "crs03": "paper2",
     "mhd03": "paper2",
+    "fog_paper3": "fog_paper3",
 }
 PRESETS = preset_names("testbed.sensors")
 
 
 @pytest.mark.parametrize(("preset", "name"), SUPPORTED.items())
 def test_a_preset_names_the_belief_that_its_data_sheet_supports(preset, name):
-    kind = "mhd_ars" if preset in ("sx300", "mhd03") else "mems_gyro"
+    kind = preset_of("testbed.sensors", preset)["type"]
     assert belief_of(preset) == load_belief(name)[kind]
     assert belief_of(preset).source == name
 
@@ -45,7 +47,21 @@ def test_the_data_sheet_of_the_unfiltered_gyro_is_its_own():
     assert belief_of("adis16505").input_noise == load_preset("adis16505").angle_random_walk
 
 
-def test_no_data_sheet_no_belief():
+def test_the_belief_of_the_fibre_optic_gyro_is_its_data_sheet():
+    """Its file has the low-pass times the mean over the interval, and the noise, that the instrument's sheet gives."""
+    fog, belief, freq = load_preset("fog_paper3"), belief_of("fog_paper3"), np.logspace(-2, 2.3, 51)
+    sheet = SensorBelief(**fog.sheet_belief())
+    # Sixteen digits of the coefficients are written down.
+    np.testing.assert_allclose(belief.response(freq), sheet.response(freq), rtol=1e-12)
+    for name in ("output_noise", "bias_instability", "lowest_frequency", "range"):
+        assert getattr(belief, name) == pytest.approx(getattr(sheet, name), rel=1e-12, abs=0.0)
+    # The mean is that of 50 samples, 25 us later than believed, and its square (s T)^4 / 720 apart: 0.1 % at 40 Hz.
+    np.testing.assert_allclose(belief.response(freq[freq < 40.0]), fog.response(freq[freq < 40.0]), rtol=8e-3)
+
+
+def test_no_data_sheet_no_belief(monkeypatch):
+    content = {key: value for key, value in preset_of("testbed.sensors", "fog_paper3").items() if key != "belief"}
+    monkeypatch.setattr("testbed.scenario.beliefs.preset", lambda *_: content)
     with pytest.raises(ValueError, match=r"fog_paper3: .* exact=True"):
         belief_of("fog_paper3")
 
@@ -110,10 +126,9 @@ def test_never_another_presets_belief(tmp_path):
     assert scenario.fusion["kalman"].belief["mhd_b"] == belief_of("mhd03")
 
 
-@pytest.mark.parametrize("own", ["{type: mhd_ars, PLAIN}", "{preset: fog_paper3}"], ids=["no preset", "no belief"])
-def test_a_sensor_of_which_nothing_is_believed_is_an_error_with_its_remedy(tmp_path, own):
+def test_a_sensor_of_which_nothing_is_believed_is_an_error_with_its_remedy(tmp_path):
     plain = {k: v for k, v in _preset_text("sx300").items() if k not in ("type", "belief")}
-    entry = own.replace("PLAIN", _flow(plain))
+    entry = f"{{type: mhd_ars, {_flow(plain)}}}"
     edits = [("mhd_ars: {preset: sx300}", f"mhd_ars: {{preset: sx300}}\n  other: {entry}")]
     with pytest.raises(testbed.ScenarioError) as caught:
         short(tmp_path, *edits)

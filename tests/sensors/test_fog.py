@@ -213,3 +213,18 @@ def test_quantisation_is_identified_at_100_hz(seed):
 
 def fitted_noise(fs, n_time, seed):
     return fit_allan(allan_deviation(NoiseStage(PRESET.noise_terms(fs, seed, "fog")).process(n_time), fs))
+
+
+def test_a_seed_is_a_cycle_where_coefficients_scatter():
+    """Another drift for another seed, the same with and without noise, and no clean reading that all seeds share."""
+    heat = 293.15 + 30.0 * np.sin(np.linspace(0.0, 6.0, 5000))
+    thermal = PRESET.thermal.model_copy(update={"scatter": 0.1})
+    drifts = {
+        (seed, noise): sense(fog(noise=noise, thermal=thermal), np.zeros(5000), heat, seed=seed)[1].drift
+        for seed in (1, 2)
+        for noise in (True, False)
+    }
+    np.testing.assert_array_equal(drifts[1, True], drifts[1, False])
+    assert np.std(drifts[1, True] - drifts[2, True]) > 0.01 * np.std(drifts[1, True])
+    assert not fog(thermal=thermal).start(1.0, 1, "fog").separable
+    assert fog().start(1.0, 1, "fog").separable

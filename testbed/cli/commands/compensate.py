@@ -9,7 +9,7 @@ import typer
 
 from testbed.cli.options import Output, expanded
 from testbed.cli.status import MISSED
-from testbed.compensation import PAPER
+from testbed.compensation import LITERATURE
 from testbed.drift.columns import Columns
 
 app = typer.Typer(
@@ -69,19 +69,22 @@ def apply(
 @expanded
 def audit(
     model: Annotated[
-        str, typer.Argument(metavar="MODEL", help=f"Trained model (JSON), or {PAPER}: the paper's own protocol.")
+        str,
+        typer.Argument(
+            metavar="MODEL", help=f"Trained model (JSON), or {', '.join(LITERATURE)}: methods of paper 3's Table 2."
+        ),
     ],
     source: Source,
     output: Output,
     columns: Columns,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("runs/audit"),
 ) -> None:
-    """Find out what a compensation removes and how much true rate survives; status 1 if it leaks."""
+    """Find out what a compensation removes and how much true rate survives; status 1 if it leaks or is none."""
     from testbed.cli.drift import print_audit
     from testbed.drift.page import audit_document
     from testbed.drift.session import audit_model
 
     audited = audit_model(model, source, columns, out, lambda text: output.note(f"{text} ..."))
     output.show({**audit_document(audited), "written": str(out)}, lambda: print_audit(audited, out))
-    if audited.audit.leaks:
+    if not audited.audit.passed:
         raise typer.Exit(MISSED)

@@ -32,10 +32,11 @@ def sweep(
 ) -> None:
     """Play every case of a study under its seeds: cases.parquet and sweep.html."""
     from testbed.campaigns.study import load_study
+    from testbed.cli.repeat import repeat
 
     loaded = load_study(study, plugins=plugin or ())
     if only is not None:
-        _repeat(loaded, only, out, output)
+        repeat(loaded, only, out, output)
         return
     from testbed.campaigns.size import size_of, sweep_words
     from testbed.campaigns.sweep import sweep as play
@@ -100,22 +101,3 @@ def _print(document: dict[str, Any]) -> None:
     if len(document["failures"]) > _MOST_FAILURES:
         console.print(f"and {len(document['failures']) - _MOST_FAILURES} more failures, in cases.parquet")
     console.print(f"wrote {document['written']}: cases.parquet, sweep.html")
-
-
-def _repeat(study: Study, only: str, out: Path | None, output: Output) -> None:
-    """Run one case with one seed, as the sweep played it."""
-    from testbed.chain.runner import run
-    from testbed.cli.terminal import print_metrics
-    from testbed.errors import Problem, ScenarioError
-
-    number, _, seed = only.partition(":")
-    if not (number.isdecimal() and seed.isdecimal() and int(number) < len(study.cases)):
-        last = len(study.cases) - 1
-        msg = f"expected CASE:SEED, the case from 0 to {last}, such as {last}:{study.seeds[0]}, got {only!r}"
-        raise ScenarioError([Problem(msg, "--only")])
-    case = study.cases[int(number)]
-    target = out or Path("runs") / f"{study.name}_case{case.number}_seed{int(seed)}"
-    output.note(f"case {case.number}: " + ", ".join(f"{key} {value}" for key, value in case.values.items()))
-    with output.progress(case.scenario.name, case.scenario.frame.duration) as tick:
-        result = run(case.scenario, out=target, seed=int(seed), progress=tick)
-    output.show({**result.metrics.to_dict(), "written": str(target)}, lambda: print_metrics(result.metrics, target))

@@ -23,10 +23,20 @@ Kind = Literal[
 ]
 # What `remedied` can apply to readings and stamps without knowing more than the record tells.
 SAFE: tuple[Kind, ...] = ("sign", "unit", "gain", "offset", "rate")
-# Chance that a finding is none, of each interval.
-CHANCE = 1e-4
+# Half of an interval over a normal standard deviation: a finding that is none has a chance of 1e-4.
+QUANTILE = 3.8906
 # A departure below these is no finding however sure it is: of a gain [-], of an offset [s], of a rate [-].
 TOLERANCE: dict[str, float] = {"gain": 0.01, "offset": 3e-4, "rate": 1e-4}
+
+# What else rates are written in: how many of it are 1 rad/s.
+UNITS = {
+    "deg/s": 1.0 / DEG,
+    "rev/s": 0.5 / math.pi,
+    "rpm": 30.0 / math.pi,
+    "mrad/s": 1e3,
+    "arcmin/s": 60.0 / DEG,
+    "deg/h": 3600.0 / DEG,
+}
 
 # A unit of `Finding` -> how it is shown: factor, decimals, unit.
 _SHOWN = {

@@ -78,7 +78,7 @@ class TextTable:
         self.dated = frozenset(i for i, kind in enumerate(self.dialect.kinds) if kind in {"iso", "clock"})
         self.format = f"text: {self.dialect}"
         self.header = self.dialect.preamble
-        self.columns = self._columns()
+        self.columns = self._columns(path.stat().st_size * max(map(head.count, (b"\n", b"\r"))) // len(head))
         self.notes: list[str] = []
 
     def blocks(self, wanted: Sequence[int], stamps: Collection[int] = ()) -> Iterator[Block]:
@@ -116,11 +116,11 @@ class TextTable:
             row -= 1
         return None
 
-    def _columns(self) -> list[TableColumn]:
+    def _columns(self, n_about: int) -> list[TableColumn]:
         dialect = self.dialect
         names = dialect.names or tuple(f"column {i + 1}" for i in range(len(dialect.kinds)))
         units = dialect.units or ("",) * len(names)
-        return [TableColumn(name, unit) for name, unit in zip(names, units, strict=True)]
+        return [TableColumn(name, unit, about=n_about) for name, unit in zip(names, units, strict=True)]
 
     def _raw(self) -> Iterator[tuple[bytes, bool]]:
         """Yield blocks of whole lines in UTF-8, and whether it is the last."""

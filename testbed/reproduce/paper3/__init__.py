@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from testbed.compensation import paper3
+from testbed.compensation import paper3, rivals
 from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
@@ -25,6 +25,7 @@ from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
+from testbed.reproduce.paper3.figures import Decomposed, write_figures_10_to_14
 from testbed.reproduce.paper3.page import page
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.compensation.model_only import DriftModel
-    from testbed.drift.leak import Audit
     from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
 
@@ -49,11 +49,13 @@ def _ramp(to: str, rate: str = "0.1 K/min") -> dict[str, str]:
     return {"ramp": f"{to} degC", "rate": rate}
 
 
-# Length [s] and steps: the programme of the paper; for training, the other way round, and the paper's order at another
-# pace.
+# Length [s] and steps: the programme of the paper; for training, the other way round, the paper's order at another
+# pace, and both ways at two rates (scenarios/fog).
 PROGRAMMES = {
     "paper": (85_200, [_HOLD, _ramp("60"), _ramp("-30")]),
     "down first": (91_200, [_HOLD, _ramp("-30"), _ramp("60")]),
+    "two rates, up": (97_200, [_HOLD, _ramp("60", "0.15 K/min"), _ramp("-30"), _ramp("20", "0.15 K/min")]),
+    "two rates, down": (97_200, [_HOLD, _ramp("-30", "0.15 K/min"), _ramp("60"), _ramp("20", "0.15 K/min")]),
     "up first": (75_800, [_HOLD, _ramp("60", "0.12 K/min"), {"hold": "1 h"}, _ramp("-30", "0.12 K/min")]),
 }
 # "Temperature" alone, as the paper has it, cannot describe a drift that depends on its slope: here it gets the slope
@@ -116,8 +118,8 @@ class Contender:
     compensate: Compensate
 
 
-def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalRecord:
-    """Return a thermal cycle of the gyro `fog_paper3` on a base at rest.
+def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0, gyro: Fog | None = None) -> ThermalRecord:
+    """Return a thermal cycle of a gyro on a base at rest.
 
     Parameters
     ----------
@@ -127,15 +129,38 @@ def cycle(programme: str, seed: int, sample_rate_hz: float = 1.0) -> ThermalReco
         Of the noise.
     sample_rate_hz : float, optional
         Rate of the readings [Hz].
+    gyro : Fog, optional
+        The instrument; `fog_paper3` if not given.
     """
     duration, steps = PROGRAMMES[programme]
     profile = TemperatureProfile.model_validate({"start": "20 degC", "steps": steps}, context={"border": True})
-    n_time = round(duration * sample_rate_hz)
-    fog = cast("Fog", load_preset("fog_paper3")).model_copy(update={"sample_rate": sample_rate_hz})
+    found = through(profile, round(duration * sample_rate_hz), seed, sample_rate_hz, gyro)
+    return replace(found, name=f"{programme}, seed {seed}")
+
+
+def through(
+    profile: TemperatureProfile, n_time: int, seed: int, sample_rate_hz: float, gyro: Fog | None = None
+) -> ThermalRecord:
+    """Return what a gyro on a base at rest reads through a programme of temperatures.
+
+    Parameters
+    ----------
+    profile : TemperatureProfile
+        Around the gyro, which has rested in its start before.
+    n_time : int
+        Readings.
+    seed : int
+        Of the noise.
+    sample_rate_hz : float
+        Rate of the readings [Hz].
+    gyro : Fog, optional
+        As for `cycle`.
+    """
+    fog = (gyro or cast("Fog", load_preset("fog_paper3"))).model_copy(update={"sample_rate": sample_rate_hz})
     stage = fog.start(sample_rate_hz, seed, "fog")
     oven = Surroundings(temperature=profile.at(0, n_time, sample_rate_hz))
     rate = stage.process_in(np.full(n_time, EARTH), oven)
-    return ThermalRecord(f"{programme}, seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
+    return ThermalRecord(f"seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
 def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
@@ -154,6 +179,10 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
     yield Contender(ORIGINAL, "-", lambda record: record.rate)
     yield Contender(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
     yield Contender("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
+    trials = protocol.options.trials
+    yield Contender("AKF [22]", "-", lambda record: rivals.akf22(record, seed=seed))
+    yield Contender("OLMD-KPCA", "-", lambda record: rivals.olmd_kpca(record, seed=seed))
+    yield Contender("CEEMDAN-LWT", "-", lambda record: rivals.ceemdan_lwt(record, seed=seed, trials=trials))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
@@ -178,7 +207,8 @@ def _applied(model: DriftModel) -> Compensate:
 
 
 def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iterator[str]:
-    """Write table_2.csv, paper3.html and the audits of the first seed, and yield the table line by line.
+    """Write table_2.csv, paper3.html, figures 10 to 14 and the audits of the first seed, and yield the table line by
+    line.
 
     Parameters
     ----------
@@ -197,7 +227,7 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     protocol = protocol or DriftProtocol()
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     folders: dict[str, str] = {}
-    audits: dict[str, Audit] = {}
+    first: dict[str, Audited] = {}
     for seed in range(1, seeds + 1):
         thermal = cycle("paper", seed, protocol.sample_rate_hz)
         for case in cases(seed, protocol):
@@ -211,19 +241,23 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
             )
             if seed == 1:
                 folders[_title(case)] = f"audit_{case.name}_{case.trained_on}".translate(_PLAIN)
-                audits[_title(case)] = audited.audit
+                first[_title(case)] = audited
                 write_audit(audited, out / folders[_title(case)])
     rows = [(*key, *_medians(runs)) for key, runs in found.items()]
     write_text(out / "table_2.csv", _csv(rows, found))
+    audits = {name: audited.audit for name, audited in first.items()}
     write_text(out / "paper3.html", page(_shown(rows, found), audits, list(folders.values()), seeds))
     yield from _printed(rows, found, seeds)
+    yield ""
+    yield "figures of the first seed (SVG and PNG, the numbers in CSV)"
+    yield from write_figures_10_to_14(Decomposed.of(first[ORIGINAL].thermal, protocol.options, 1), first, out)
 
 
 def _title(case: Contender) -> str:
     return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
-_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
+_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None, "[": None, "]": None})
 
 
 def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:
@@ -249,27 +283,31 @@ def _medians(runs: list[dict[str, Any]]) -> list[float | None]:
 
 
 def _csv(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]]) -> str:
-    lines = [",".join(("method", "trained_on", "leaks", *COLUMNS, *PAPER_COLUMNS))]
+    lines = [",".join(("method", "trained_on", "leaks", "refused", *COLUMNS, *PAPER_COLUMNS))]
     for name, trained_on, *values in rows:
-        leaks = sum(not run["passed"] for run in found[name, trained_on])
         paper = TABLE_2.get(name, (None,) * 4)
-        lines.append(",".join([name, trained_on, str(leaks), *(_text(value) for value in (*values, *paper))]))
+        verdicts = map(str, _verdicts(found[name, trained_on]))
+        lines.append(",".join([name, trained_on, *verdicts, *(_text(value) for value in (*values, *paper))]))
     ours = {name for name, *_ in rows}
-    blank = ["" for _ in ("trained_on", "leaks", *COLUMNS)]
+    blank = ["" for _ in ("trained_on", "leaks", "refused", *COLUMNS)]
     lines += [",".join([name, *blank, *map(_text, values)]) for name, values in TABLE_2.items() if name not in ours]
     return "\n".join(lines) + "\n"
+
+
+def _verdicts(runs: list[dict[str, Any]]) -> tuple[int, int]:
+    """Return how many audits found a leak, and how many refused it for whatever reason."""
+    return sum(bool(run["leaks"]) for run in runs), sum(not run["passed"] for run in runs)
 
 
 def _shown(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]]) -> list[dict[str, Any]]:
     """Return the rows of the page; the paper's methods that are not ours last."""
     shown = []
     for name, trained_on, *values in rows:
-        leaks = sum(not run["passed"] for run in found[name, trained_on])
-        shown.append(
-            {"method": name, "trained_on": trained_on, "leaks": leaks, **dict(zip(COLUMNS, values, strict=True))}
-        )
+        leaks, refused = _verdicts(found[name, trained_on])
+        known = {"method": name, "trained_on": trained_on, "leaks": leaks, "refused": refused}
+        shown.append({**known, **dict(zip(COLUMNS, values, strict=True))})
     ours = {row["method"] for row in shown}
-    blank = {"trained_on": "", "leaks": None, **dict.fromkeys(COLUMNS)}
+    blank = {"trained_on": "", "leaks": None, "refused": None, **dict.fromkeys(COLUMNS)}
     shown += [{"method": name, **blank} for name in TABLE_2 if name not in ours]
     return [{**row, **_paper_of(row["method"])} for row in shown]
 
@@ -286,17 +324,15 @@ def _printed(
         f"Table 2 on our data, median over {seeds} seed(s); B in deg/h, N in deg/sqrt(h), none where the noise "
         "model does not describe the curve"
     )
-    heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks")
-    yield f"{'method':20s}{'trained on':18s}" + "".join(f"{head:>11s}" for head in heads)
+    heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks", "refused")
+    yield f"{'method':31s}{'trained on':16s}" + "".join(f"{head:>11s}" for head in heads)
     for name, trained_on, *values in rows:
         at = dict(zip(COLUMNS, values, strict=True))
         paper = TABLE_2.get(name, (None,) * 4)
         shown = [at["bias_instability_deg_h"], at["angle_random_walk_deg_sqrt_h"], paper[1], paper[2]]
         shown += [at[key] for key in ("drift_reduction", "oracle_ratio_1h", "least_gain_in_drift_band", "step_gain")]
-        leaks = sum(not run["passed"] for run in found[name, trained_on])
-        yield (
-            f"{name:20s}{trained_on:18s}" + "".join(f"{_short(value):>11s}" for value in shown) + f"{leaks:>8d}/{seeds}"
-        )
+        verdicts = "".join(f"{n:>9d}/{seeds}" for n in _verdicts(found[name, trained_on]))
+        yield f"{name:31s}{trained_on:16s}" + "".join(f"{_short(value):>11s}" for value in shown) + verdicts
 
 
 def _text(value: float | None) -> str:

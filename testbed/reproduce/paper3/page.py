@@ -8,7 +8,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from testbed.drift.figures import SIZE_IN, residual_allan_figure
-from testbed.drift.leak import DRIFT_PERIOD, LEAST_GAIN
+from testbed.drift.findings import DRIFT_PERIOD, LEAST_GAIN
 from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH
 from testbed.pages.svg import STYLE
 from testbed.pages.template import render
@@ -16,13 +16,16 @@ from testbed.pages.template import render
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from testbed.drift.leak import Audit
+    from testbed.drift.findings import Audit
 
 # Colour and line of the methods, in the order of the table; the oracle last.
 _STYLES = (
     (SENSORS[0], "-"),
     (COMMANDED, (0, (1.2, 1.6))),
     (COMMANDED, (0, (5, 2))),
+    (SENSORS[2], "-"),
+    (SENSORS[2], (0, (5, 2))),
+    (SENSORS[2], (0, (1.2, 1.6))),
     (FILTERS[2], "-"),
     (FILTERS[3], (0, (7, 1.2, 1.5, 1.2))),
     (SENSORS[1], (0, (3, 1.2))),

@@ -41,7 +41,7 @@ def test_above_the_edge_R_settles_where_the_closed_form_has_it(above: float) -> 
     K = 0.5 * (np.sqrt(excess**2 + 8.0 * excess) - excess)
     readings = {"one": z, "silent": np.full(t.size, np.nan)}
     chosen = {"q": q, "beta": 0.9999, "R0": {"one": noise**2}}
-    block = estimate("shakf", readings, sample_rate_hz=rates, belief=belief, **chosen)
+    block = estimate("shakf", readings, sample_rate_hz=rates, belief=belief, verdict=False, **chosen)
     # R is a mean of e^2 over n = 2e5 readings: sqrt(2/n) = 0.3 %, times up to three by the feedback through the gain,
     # three sigma; the lag's (w T / K)^2 is 0.2 %.
     settled = block.diagnostics["R_one"][t.size // 2 :].mean()

@@ -53,7 +53,7 @@ def test_bounds_of_R_hold_and_are_counted(readings: dict[str, FloatArray]) -> No
     belief = build_model(default_belief(), RATES, order=1, q=1.0).R
     for parameters, lowest in (({"clamp": None, "R_floor": 3e-12}, [3e-12] * 2), ({"clamp": 7.0}, belief / 7.0)):
         # The gate would strike out readings that never change.
-        block = estimate("allan_srkf", still, sample_rate_hz=RATES, gate=False, **parameters)
+        block = estimate("allan_srkf", still, sample_rate_hz=RATES, gate=False, verdict=False, **parameters)
         for i, name in enumerate(RATES):
             R = block.diagnostics[f"R_{name}"]
             R = R[np.isfinite(R)]
@@ -61,7 +61,9 @@ def test_bounds_of_R_hold_and_are_counted(readings: dict[str, FloatArray]) -> No
             np.testing.assert_allclose(R[1:], lowest[i], rtol=1e-12)
         assert block.diagnostics["guard_hits"][-1] == sum(value.size - 1 for value in still.values())
     loud = {name: 1e3 * value for name, value in readings.items()}
-    R = estimate("allan_srkf", loud, sample_rate_hz=RATES, gate=False, clamp=7.0).diagnostics["R_mhd_ars"]
+    R = estimate("allan_srkf", loud, sample_rate_hz=RATES, gate=False, verdict=False, clamp=7.0).diagnostics[
+        "R_mhd_ars"
+    ]
     assert R[-1] == pytest.approx(7.0 * belief[1], rel=1e-12, abs=0.0)
 
 

@@ -1,4 +1,4 @@
-"""Write the table of commands into README.md: `python -m tests.project.readme`."""
+"""Write the table of commands into docs/commands.md: `python -m tests.project.commands`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 from tests.cli.commands import COMMANDS, arguments, options
 
-README = Path(__file__).parents[2] / "README.md"
-BEGIN, END = "<!-- commands, written by `make readme` -->\n", "<!-- end of the commands -->\n"
+PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
+BEGIN, END = "<!-- commands, written by `make commands` -->\n", "<!-- end of the commands -->\n"
 
 
 def row(words: str, command: Any) -> str:
@@ -32,10 +32,10 @@ def table() -> str:
 
 
 def with_table(text: str) -> str:
-    """Return the text of the README with the table as the commands are."""
+    """Return the text of the page with the table as the commands are."""
     head, rest = text.split(BEGIN)
     return head + BEGIN + table() + END + rest.split(END)[1]
 
 
 if __name__ == "__main__":
-    README.write_text(with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

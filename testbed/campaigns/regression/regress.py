@@ -1,0 +1,121 @@
+"""The standard campaign from its first case to the leaderboard."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from testbed.campaigns.regression.compare import Move, incomparable, moves
+from testbed.campaigns.regression.history import HISTORY, append, essence, latest, read_history
+from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
+from testbed.campaigns.regression.page import write_leaderboard
+from testbed.campaigns.regression.standard import SHORT, STANDARD, Contenders, shipped, standard_study
+from testbed.campaigns.rows import OK
+from testbed.campaigns.store import STUDY, read_cases
+from testbed.campaigns.sweep import sweep
+from testbed.errors import Problem, ScenarioError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from testbed.campaigns.study import Study
+    from testbed.campaigns.sweep import Progress
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a standard campaign.
+
+    `moves` is what is no longer as in the baseline, `incomparable` what has none, `standings` the leaderboard,
+    `failures` the rows of cases that failed, `cpu_seconds` the processor time of this launch.
+    """
+
+    folder: Path
+    moves: Sequence[Move]
+    incomparable: Sequence[str]
+    standings: Sequence[Standing]
+    failures: Sequence[Mapping[str, Any]]
+    cpu_seconds: float
+
+
+def run_regression(
+    entry: Contenders | None = None,
+    *,
+    short: bool = False,
+    update: str | None = None,
+    workers: int = 1,
+    out: str | Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    history: Path = HISTORY,
+) -> Outcome:
+    """Play the standard campaign, compare it with its baseline and write ``leaderboard.html`` beside ``sweep.html``.
+
+    A folder of a campaign that came to its end is played anew, one that did not is gone on with.
+
+    Parameters
+    ----------
+    entry : Contenders, optional
+        Filters to play, which join the leaderboard of the baseline; all that ship if not given.
+    short : bool, optional
+        The short form.
+    update : str, optional
+        Store the result as the baseline, for this reason.
+    workers : int, optional
+        Processes.
+    out : str or Path, optional
+        Folder; ``runs/regress_standard`` or ``runs/regress_short``, with the names of an entry, if not given.
+    progress : callable, optional
+        As for `testbed.sweep`.
+    history : Path, optional
+        Where the baseline stands.
+
+    Raises
+    ------
+    ScenarioError
+        If a filter is refused, or an update is asked for of an entry or of a campaign with failures.
+    """
+    if update is not None and entry is not None:
+        raise ScenarioError(
+            [Problem("expected no --filter: the baseline is that of the filters that ship", "--update")]
+        )
+    begun = _spent()
+    study = standard_study(entry or shipped(), short=short)
+    target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
+    _begin(target, study)
+    folder = sweep(study, workers=workers, out=target, progress=progress)
+    table = read_cases(folder).to_pylist()
+    rows, failures = essence(table), [row for row in table if row["status"] != OK]
+    stored = read_history(history)
+    campaign = SHORT if short else STANDARD
+    before, costs = latest(stored, campaign), costs_of(study.cases[0].scenario)
+    mine = set(study.cases[0].scenario.fusion) | set(study.cases[0].scenario.sensors)
+    same = [row for row in before if entry is None or row["source"] in mine]
+    others = [row for row in before if entry is not None and row["source"] not in mine]
+    costs = {row["source"]: row["cost"] for row in others if row["cost"] is not None} | costs
+    order, spent = standings([*others, *rows], costs), _spent() - begun
+    found = Outcome(folder, moves(rows, same), incomparable(rows, same), order, failures, spent)
+    if update is not None:
+        if failures:
+            raise ScenarioError([Problem(f"{len(failures)} runs failed, first: {failures[0]['reason']}", "--update")])
+        append(rows, costs, campaign, update, history)
+    write_leaderboard(folder, study, found.standings, found.moves, read_history(history), campaign)
+    return found
+
+
+def _spent() -> float:
+    """Return the processor time of this process and of those that it started and that ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def _begin(folder: Path, study: Study) -> None:
+    """Remove a campaign that came to its end: the code may be another since."""
+    if not (folder / STUDY).is_file():
+        return
+    rows = read_cases(folder, ["case", "seed"])
+    done = set(zip(rows["case"].to_pylist(), rows["seed"].to_pylist(), strict=True))
+    if len(done) >= len(study.cases) * len(study.seeds):
+        shutil.rmtree(folder)

@@ -1,0 +1,85 @@
+"""What a sensor's readings show by themselves: gaps, readings that repeat, readings at the end of the range."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from testbed.fusion.analysis.finding import Finding
+from testbed.fusion.gate import most_repeats, step_std
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from testbed.fusion.analysis.paths import Trace
+
+# A gap is a finding from this length [s] and this many intervals on, and whatever their lengths from this share on.
+_LONG_GAP, _INTERVALS, _LOST = 0.01, 5.0, 0.02
+
+
+def continuity_findings(name: str, trace: Trace, factor: float = 1.0) -> Iterator[Finding]:
+    """Yield what stands against the readings of a sensor by themselves.
+
+    Parameters
+    ----------
+    name : str
+        Of the sensor.
+    trace : Trace
+        Its readings.
+    factor : float, optional
+        What they are too large by, if their unit is not the one that was said [-].
+    """
+    yield from _gaps(name, trace)
+    stuck, count = repeated(trace), trace.z.size
+    if stuck.any():
+        remedy = (
+            f"{np.count_nonzero(stuck)} readings repeat each other, more than {_most(trace)} in a row, as none of the "
+            "believed noise and resolution do: mend what stuck, or take them for missing"
+        )
+        yield Finding("repeats", name, np.count_nonzero(stuck) / count, math.nan, math.nan, "1", remedy)
+    limit = math.inf if trace.belief.range is None else trace.belief.range - 1.5 * (trace.belief.resolution or 0.0)
+    ends = np.count_nonzero(np.abs(trace.z) >= factor * limit)
+    if ends:
+        remedy = (
+            f"{ends} readings are at the end of the range or beyond, and filters take them for missing: take a wider "
+            "range, or correct that of the belief"
+        )
+        yield Finding("saturation", name, ends / count, math.nan, math.nan, "1", remedy)
+
+
+def repeated(trace: Trace) -> NDArray[np.bool_]:
+    """Return which readings belong to a run of equal ones that is too long for the believed noise, shape (n_time,).
+
+    Parameters
+    ----------
+    trace : Trace
+        Readings and belief.
+    """
+    most, z = _most(trace), trace.z
+    if not most:
+        return np.zeros(z.size, dtype=bool)
+    begins = np.flatnonzero(np.concatenate([[True], np.diff(z) != 0.0]))
+    lengths = np.diff(begins, append=z.size)
+    return np.repeat(lengths > most, lengths)
+
+
+def _most(trace: Trace) -> int:
+    return most_repeats(step_std(trace.belief, 1.0 / trace.interval), trace.belief.resolution)
+
+
+def _gaps(name: str, trace: Trace) -> Iterator[Finding]:
+    good = trace.t[np.isfinite(trace.z)]
+    usual = trace.interval
+    between = np.diff(good, prepend=trace.t[0] - usual, append=trace.t[-1] + usual)
+    missing = float(np.sum(np.maximum(np.rint(between / usual) - 1.0, 0.0)))
+    share, longest = missing / (missing + good.size), float(between.max())
+    if longest > max(_LONG_GAP, _INTERVALS * usual) or share > _LOST:
+        remedy = (
+            f"{missing:.0f} readings are missing, for {longest:.3g} s at the longest: filters predict through a gap, "
+            "and their std says how far"
+        )
+        yield Finding("gaps", name, share, math.nan, math.nan, "1", remedy)

@@ -1,0 +1,110 @@
+"""The interacting multiple model of Blom and Bar-Shalom, as published: nothing in it is tuned here."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from testbed.fusion.base import BlockFilter, Rows
+from testbed.fusion.filters.kalman import KalmanParameters
+from testbed.fusion.kernels.literature import imm_kernel
+from testbed.fusion.model import build_model
+from testbed.fusion.model_filter import FilterParameters, initial_state
+from testbed.units import DEG, PositiveDuration
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.fusion.belief import SensorBelief
+    from testbed.parts import Part
+    from testbed.signals import FloatArray
+
+Share = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class ImmParameters(FilterParameters):
+    """Parameters of `Imm`; its signal model is that of `kalman`.
+
+    Parameters
+    ----------
+    ratios : tuple of float
+        The q of each model over `q` [-]: calm, as usual, agile.
+    sojourn : float
+        Mean time that the signal stays with a model [s].
+    """
+
+    default_q: ClassVar[dict[int, float]] = KalmanParameters.default_q
+
+    ratios: Annotated[tuple[Share, ...], Field(min_length=1, max_length=8)] = (0.01, 1.0, 100.0)
+    sojourn: PositiveDuration = 1.0
+
+
+class Imm(BlockFilter):
+    r"""Interacting multiple model: Kalman filters whose signal noise q differs, under a Markov chain.
+
+    With :math:`p_{ij}` the chance to go from model i to model j within a step, each step
+
+    .. math:: c_j = \sum_i p_{ij} \mu_i,\quad \mu_{i|j} = p_{ij} \mu_i / c_j,\quad
+        x_{0j} = \sum_i \mu_{i|j} x_i,\quad P_{0j} = \sum_i \mu_{i|j} [P_i + (x_i - x_{0j})(x_i - x_{0j})'],
+
+    predicts and updates each filter from :math:`x_{0j}, P_{0j}`, weighs it by the likelihood of its innovations,
+    :math:`\mu_j \propto c_j \prod N(e_j; 0, S_j)`, and gives :math:`x = \sum \mu_j x_j` and
+    :math:`P = \sum \mu_j [P_j + (x_j - x)(x_j - x)']`. Where no reading is due the chain goes on by itself.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Dynamics and noise of each sensor.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+    parameters : ImmParameters
+        Signal model, the models and their chain.
+
+    References
+    ----------
+    Blom, Bar-Shalom, IEEE Trans. Automatic Control 33 (1988) 780-783 (doi 10.1109/9.1299).
+    """
+
+    Parameters: ClassVar[type[Part]] = ImmParameters
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
+
+    def __init__(
+        self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ImmParameters
+    ) -> None:
+        super().__init__(belief, sample_rate_hz, parameters)
+        built = partial(
+            build_model,
+            belief,
+            sample_rate_hz,
+            order=parameters.order,
+            use_input_noise=parameters.use_input_noise,
+            coloured=parameters.coloured,
+            start=parameters.start,
+        )
+        # The models differ in Q alone, and there in the part that is proportional to q.
+        self.model, calmest = built(q=parameters.q), built(q=0.0).Q
+        self._Q = np.array([calmest + ratio * (self.model.Q - calmest) for ratio in parameters.ratios])
+        if not np.all(self.model.R > 0.0):
+            msg = f"belief: expected an output_noise above 0 for each of {list(self.model.sensors)}"
+            raise ValueError(msg)
+        count = len(parameters.ratios)
+        self.rows = Rows(tuple(f"probability_{j}" for j in range(count)), ("innovation", "innovation_variance"))
+        self._X = np.tile(initial_state(self.model, parameters), (count, 1))
+        self._P = np.tile(self.model.P0, (count, 1, 1))
+        self._mu, self._started = np.full(count, 1.0 / count), False
+        self._stay = math.exp(-1.0 / (parameters.sojourn * self.model.sample_rate_hz))
+
+    @property
+    def step_seconds(self) -> float:
+        """About how long a step takes, compiled, on a core of 2020 [s]."""
+        count, n = self._X.shape
+        return 1e-7 + 2e-9 * float(count * (2 + count) * n**2)
+
+    # Its chain steps regularly.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
+        model, chain = (self.model.F, self._Q, self.model.H, self.model.R), (self._stay, self._mu, self._started)
+        self._started = imm_kernel(self._X, self._P, *model, *chain, Z, out)

@@ -1,0 +1,1 @@
+"""Recordings played through the filters, and runs written as recordings."""

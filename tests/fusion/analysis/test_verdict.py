@@ -1,0 +1,233 @@
+"""The verdict before the estimate: what is planted is named, what is right is left in peace, what cannot be told is
+said.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from testbed.errors import VerdictWarning
+from testbed.fusion import estimate
+from testbed.fusion.analysis.remedy import remedied
+from testbed.fusion.analysis.verdict import verdict
+from testbed.fusion.belief import load_belief
+from tests.records import DEG, RATES, mixed, ramped, record
+
+EQ39 = load_belief("eq39")
+DURATION = 12.0
+
+
+def stamps_of(readings):
+    return {name: np.rint(np.arange(z.size) * 1e9 / RATES[name]).astype(np.int64) for name, z in readings.items()}
+
+
+def four(t):
+    return DEG * np.sin(8.0 * np.pi * t)
+
+
+def still(t):
+    return np.zeros_like(t)
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """Return a record of lines of 0.5 and 10 Hz with its stamps."""
+    _, readings = record(ramped(mixed), DURATION, 7)
+    return readings, stamps_of(readings)
+
+
+def kinds(found):
+    return [(one.kind, one.sensor) for one in found.findings]
+
+
+FAULTS = {
+    "sign": (lambda z: -z, lambda t: t, -1.0),
+    "unit": (np.degrees, lambda t: t, math.degrees(1.0)),
+    "offset": (lambda z: z, lambda t: t + 20_000_000, 0.02),
+    "rate": (lambda z: z, lambda t: t + np.rint(1852e-6 * t).astype(np.int64), 1852e-6),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_planted_fault_is_named_alone_and_put_right(moving, kind):
+    readings, time_ns = moving
+    value, stamp, wanted = FAULTS[kind]
+    spoilt = readings | {"mems_gyro": value(readings["mems_gyro"])}
+    moved = time_ns | {"mems_gyro": stamp(time_ns["mems_gyro"])}
+    found = verdict(spoilt, moved, EQ39)
+    assert kinds(found) == [(kind, "mems_gyro")]
+    one = found.findings[0]
+    assert one.lower <= wanted <= one.upper
+    again = remedied(spoilt, moved, found)
+    assert again.verdict.unfixed == ()
+    assert verdict(again.readings, again.time_ns, EQ39).findings == ()
+
+
+def test_faults_together_are_named_together(moving):
+    readings, time_ns = moving
+    spoilt = readings | {"mems_gyro": -np.degrees(readings["mems_gyro"])}
+    moved = time_ns | {"mems_gyro": time_ns["mems_gyro"] + 20_000_000 + time_ns["mems_gyro"] // 1000}
+    found = verdict(spoilt, moved, EQ39)
+    assert {kind for kind, _ in kinds(found)} == {"sign", "unit", "offset", "rate"}
+    again = remedied(spoilt, moved, found)
+    assert verdict(again.readings, again.time_ns, EQ39).findings == ()
+
+
+def test_a_gain_is_said_of_the_sensor_that_is_blind_to_a_constant(moving):
+    readings, time_ns = moving
+    found = verdict(readings | {"mhd_ars": 1.05 * readings["mhd_ars"]}, time_ns, EQ39)
+    assert kinds(found) == [("gain", "mhd_ars")]
+    assert found.findings[0].lower <= 1.05 <= found.findings[0].upper
+
+
+def test_both_in_degrees_are_told_by_their_noise(moving):
+    readings, time_ns = moving
+    found = verdict({name: np.degrees(z) for name, z in readings.items()}, time_ns, EQ39)
+    assert kinds(found) == [("unit", "mems_gyro"), ("unit", "mhd_ars")]
+
+
+def test_a_right_record_has_no_finding(moving):
+    assert verdict(*moving, EQ39).findings == ()
+    assert verdict(*moving, load_belief("identified")).findings == ()
+
+
+def test_at_rest_nothing_is_decided_and_nothing_found():
+    _, readings = record(still, DURATION, 3)
+    found = verdict(readings, stamps_of(readings), EQ39)
+    assert found.findings == ()
+    assert any("no motion shows in both" in text for text in found.undecided)
+
+
+@pytest.mark.parametrize("motion", [mixed, still], ids=["mixed", "still"])
+def test_a_wide_gyro_under_the_belief_of_a_filtered_one(motion):
+    from testbed.sensors import load_preset
+
+    rate, readings = record(ramped(motion), DURATION, 5)
+    readings["mems_gyro"] = load_preset("adis16505").start(20_000.0, 5, "mems_gyro").process(rate)
+    found = verdict(readings, stamps_of(readings), EQ39)
+    assert kinds(found) == [("bandwidth", "mems_gyro")]
+    # The sensor's corner is 480 Hz, and the comparison reaches 0.45 of 1 kHz.
+    assert found.findings[0].value > 300.0
+
+
+def test_noise_alone_is_no_bandwidth(moving):
+    """White noise on the readings far above the believed one, while the response is as believed."""
+    readings, time_ns = moving
+    rng = np.random.default_rng(2)
+    # Five times the angle random walk, 0.0025 deg/sqrt(s), at 2 kHz.
+    loud = readings["mems_gyro"] + 5.0 * 0.0025 * DEG * math.sqrt(2000.0) * rng.normal(size=readings["mems_gyro"].size)
+    assert kinds(verdict(readings | {"mems_gyro": loud}, time_ns, EQ39)) == [("belief", "mems_gyro")]
+
+
+def test_a_bias_of_the_blind_sensor_shows_and_that_of_the_other_does_not(moving):
+    readings, time_ns = moving
+    found = verdict(readings | {"mhd_ars": readings["mhd_ars"] + 0.05 * DEG}, time_ns, EQ39)
+    assert kinds(found) == [("bias", "mhd_ars")]
+    assert found.findings[0].lower < 0.05 * DEG < found.findings[0].upper
+    assert found.findings[0].upper - found.findings[0].lower < 0.02 * DEG
+    found = verdict(readings | {"mems_gyro": readings["mems_gyro"] + 0.05 * DEG}, time_ns, EQ39)
+    assert found.findings == ()
+    assert "mems_gyro: bias: it alone sees a constant rate" in found.undecided
+
+
+def test_gaps_repeats_and_ends_of_the_range(moving):
+    readings, time_ns = moving
+    z = readings["mhd_ars"].copy()
+    z[100_000:110_000] = np.nan
+    assert kinds(verdict(readings | {"mhd_ars": z}, time_ns, EQ39)) == [("gaps", "mhd_ars")]
+    z[100_000:110_000] = readings["mhd_ars"][100_000]
+    assert kinds(verdict(readings | {"mhd_ars": z}, time_ns, EQ39)) == [("repeats", "mhd_ars")]
+    z = readings["mhd_ars"].copy()
+    z[100_000:100_004] = 31.0 * DEG
+    found = verdict(readings | {"mhd_ars": z}, time_ns, EQ39)
+    assert ("saturation", "mhd_ars") in kinds(found)
+
+
+def test_missing_stamps_are_gaps_as_missing_readings_are(moving):
+    readings, time_ns = moving
+    keep = np.ones(readings["mems_gyro"].size, dtype=bool)
+    keep[10_000:10_500] = False
+    found = verdict(
+        readings | {"mems_gyro": readings["mems_gyro"][keep]}, time_ns | {"mems_gyro": time_ns["mems_gyro"][keep]}, EQ39
+    )
+    assert kinds(found) == [("gaps", "mems_gyro")]
+    assert found.findings[0].value == pytest.approx(500 / keep.size)
+
+
+def test_the_odd_one_of_three_is_named(moving):
+    """Of two gyros and an MHD ARS the one that all others contradict."""
+    _, more = record(ramped(mixed), DURATION, 8)
+    readings, time_ns = moving
+    three = readings | {"second": more["mems_gyro"]}
+    clocks = time_ns | {"second": time_ns["mems_gyro"]}
+    belief = EQ39 | {"second": EQ39["mems_gyro"]}
+    assert verdict(three, clocks, belief).findings == ()
+    assert kinds(verdict(three | {"mhd_ars": -three["mhd_ars"]}, clocks, belief)) == [("sign", "mhd_ars")]
+    assert kinds(verdict(three | {"second": -three["second"]}, clocks, belief)) == [("sign", "second")]
+    assert kinds(verdict(three | {"mhd_ars": 1.05 * three["mhd_ars"]}, clocks, belief)) == [("gain", "mhd_ars")]
+    assert kinds(verdict(three | {"second": 1.05 * three["second"]}, clocks, belief)) == [("gain", "second")]
+
+
+def test_one_sensor_alone_leaves_all_else_open(moving):
+    readings, time_ns = moving
+    found = verdict({"mhd_ars": readings["mhd_ars"]}, {"mhd_ars": time_ns["mhd_ars"]}, EQ39)
+    assert found.findings == ()
+    assert any("no other sensor" in text for text in found.undecided)
+
+
+def test_too_little_is_said_to_be_too_little(moving):
+    readings, time_ns = moving
+    short = {name: z[: round(RATES[name])] for name, z in readings.items()}
+    found = verdict(short, {name: time_ns[name][: z.size] for name, z in short.items()}, EQ39)
+    assert found.findings == ()
+    assert any("in common" in text for text in found.undecided)
+    empty = {name: np.full(50, np.nan) for name in readings}
+    found = verdict(empty, {name: time_ns[name][:50] for name in readings}, EQ39)
+    assert len(found.undecided) == 2
+
+
+def test_stamps_may_be_of_any_clock(moving):
+    """Stamps of a clock that began in 1970, jitter of 20 us, and readings that are out of order."""
+    readings, time_ns = moving
+    rng = np.random.default_rng(4)
+    late = time_ns["mems_gyro"] + 1_700_000_000_000_000_000
+    order = np.arange(late.size)
+    order[100:102] = 101, 100
+    # A sine of 10 Hz and 0.18 deg/s moves by 0.0002 deg/s in 20 us, a hundredth of the noise.
+    jittered = (late + np.rint(20_000 * rng.normal(size=late.size)).astype(np.int64))[order]
+    found = verdict(
+        readings | {"mems_gyro": readings["mems_gyro"][order]},
+        {"mems_gyro": jittered, "mhd_ars": time_ns["mhd_ars"] + 1_700_000_000_000_000_000},
+        EQ39,
+    )
+    assert found.findings == ()
+
+
+def test_stamps_are_asked_for(moving):
+    readings, time_ns = moving
+    with pytest.raises(ValueError, match="time_ns: expected the stamps of the"):
+        verdict(readings, {"mhd_ars": time_ns["mhd_ars"]}, EQ39)
+    with pytest.raises(ValueError, match="belief: expected one for each"):
+        verdict(readings, time_ns, {"mhd_ars": EQ39["mhd_ars"]})
+
+
+def test_readings_stay_as_they_are(moving):
+    readings, time_ns = moving
+    before = {name: z.copy() for name, z in readings.items()}
+    verdict(readings, time_ns, EQ39)
+    assert all(np.array_equal(before[name], z) for name, z in readings.items())
+
+
+def test_estimate_warns_of_each_finding_and_keeps_them(moving):
+    readings, _ = moving
+    assert estimate("kalman", readings, sample_rate_hz=RATES).findings == ()
+    turned = readings | {"mems_gyro": -readings["mems_gyro"]}
+    with pytest.warns(VerdictWarning, match="mems_gyro: sign -1") as said:
+        found = estimate("kalman", turned, sample_rate_hz=RATES)
+    assert [(one.kind, one.sensor) for one in found.findings] == [("sign", "mems_gyro")]
+    # It points at who called.
+    assert [one.filename for one in said] == [__file__]
+    assert estimate("kalman", turned, sample_rate_hz=RATES, verdict=False).findings == ()
