@@ -21,7 +21,7 @@ import testbed
 from testbed.fusion.belief import load_belief
 from testbed.identification.belief_text import belief_text
 from testbed.identification.model import fit_model
-from testbed.identification.response import measure
+from testbed.identification.response import measure_response
 from testbed.identification.session import identify_sensors
 from testbed.logs.reader import read_log
 from tests.identification.records import EXCITATIONS, record, rest
@@ -35,7 +35,7 @@ def inside(name: str, runs: int) -> tuple[int, int]:
     hits = np.zeros(2, int)
     for seed in range(runs):
         one = record(EXCITATIONS[name], seed)
-        found = measure(one.reference, one.output).response
+        found = measure_response(one.reference, one.output).response
         i = seed % found.freq_hz.size
         true = one.response(found.freq_hz)[i]
         off = abs(found.gain[i] - abs(true)), abs(np.angle(found.response[i] / true))
@@ -46,7 +46,7 @@ def inside(name: str, runs: int) -> tuple[int, int]:
 def refused(runs: int) -> int:
     """Return in how many records of noise alone no response is found."""
     records = (record(rest, seed, reference_std=1e-5) for seed in range(runs))
-    return sum(not measure(one.reference, one.output).response.freq_hz.size for one in records)
+    return sum(not measure_response(one.reference, one.output).response.freq_hz.size for one in records)
 
 
 def delay_error(name: str, runs: int) -> float:
@@ -54,7 +54,7 @@ def delay_error(name: str, runs: int) -> float:
     errors = []
     for seed in range(runs):
         one = record(EXCITATIONS[name], 1000 + seed, length=40.0)
-        errors.append(1e6 * abs(fit_model(measure(one.reference, one.output).response).delay - one.delay))
+        errors.append(1e6 * abs(fit_model(measure_response(one.reference, one.output).response).delay - one.delay))
     return max(errors)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import f as fisher
 
 if TYPE_CHECKING:
-    from testbed.identification.windows import Part
+    from testbed.identification.windows import SpectrumPart
     from testbed.signals import ComplexArray, FloatArray
 
 _ORDER = 2
@@ -71,12 +71,12 @@ class LocalFit:
     rest: ComplexArray
 
 
-def fit_local(part: Part, freq: FloatArray, X: ComplexArray, Y: ComplexArray, Z: ComplexArray) -> LocalFit:
+def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexArray, Z: ComplexArray) -> LocalFit:
     """Return the response in a part of the spectrum.
 
     Parameters
     ----------
-    part : Part
+    part : SpectrumPart
         Which part.
     freq : ndarray, shape (n_freq,)
         Frequencies of all bins [Hz].

@@ -9,13 +9,13 @@ import numpy as np
 
 from testbed.identification.alignment import MOST_APART, rough_clock, rough_lag
 from testbed.identification.local import LocalFit, fit_local
-from testbed.identification.spectrum import Grid, Series, spectrum
-from testbed.identification.windows import windows
+from testbed.identification.spectrum import RecordGrid, Series, spectrum
+from testbed.identification.windows import spectrum_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from testbed.identification.windows import Part
+    from testbed.identification.windows import SpectrumPart
     from testbed.signals import ComplexArray
 
 # Of the lower sample rate; a record of fewer bins says nothing.
@@ -29,7 +29,7 @@ _FIRST_STAGE = 0.25
 
 
 @dataclass(frozen=True)
-class Clock:
+class OutputClock:
     """How the clock of the output runs: it counts 1 s in (1 + error) s of the reference's.
 
     Parameters
@@ -49,9 +49,9 @@ class Matched:
 
     Parameters
     ----------
-    grid : Grid
-        Part of the record and frequencies.
-    clock : Clock
+    grid : RecordGrid
+        SpectrumPart of the record and frequencies.
+    clock : OutputClock
         Of the output.
     lag : float
         Delay that was taken off before the fits [s].
@@ -59,8 +59,8 @@ class Matched:
         In the order of frequency.
     """
 
-    grid: Grid
-    clock: Clock
+    grid: RecordGrid
+    clock: OutputClock
     lag: float
     fits: list[LocalFit]
 
@@ -89,21 +89,21 @@ def match(reference: Series, output: Series, *, one_clock: bool = False) -> Matc
         If they have too little time in common.
     """
     if one_clock:
-        return _matched(reference, output, Clock(0.0, 0.0))
-    found = [_matched(reference, output, Clock(0.0, np.inf), staged=True)]
+        return _matched(reference, output, OutputClock(0.0, 0.0))
+    found = [_matched(reference, output, OutputClock(0.0, np.inf), staged=True)]
     rough = rough_clock(reference, output)
     if rough:
-        found.append(_matched(reference, output, Clock(rough, np.inf)))
+        found.append(_matched(reference, output, OutputClock(rough, np.inf)))
     best = min(found, key=lambda one: one.misfit)
     return _matched(reference, output, best.clock)
 
 
-def _matched(reference: Series, output: Series, clock: Clock, *, staged: bool = False) -> Matched:
+def _matched(reference: Series, output: Series, clock: OutputClock, *, staged: bool = False) -> Matched:
     """Return the channels matched from a clock near enough, or by stages from one that is not."""
     grid = common_grid(reference, [(output, clock.error)])
     X = spectrum(reference, grid)[0]
     lag = rough_lag(X, spectrum(output, grid, clock.error)[0], grid.length)
-    work = _Work(output, grid, X, windows(np.abs(X) ** 2), np.exp(2j * np.pi * grid.freq_hz * lag))
+    work = _Work(output, grid, X, spectrum_parts(np.abs(X) ** 2), np.exp(2j * np.pi * grid.freq_hz * lag))
     if staged:
         edge = _FIRST_STAGE / (MOST_APART * grid.length)
         while edge < grid.freq_hz[-1]:
@@ -120,30 +120,30 @@ def _matched(reference: Series, output: Series, clock: Clock, *, staged: bool = 
 @dataclass(frozen=True)
 class _Work:
     output: Series
-    grid: Grid
+    grid: RecordGrid
     X: ComplexArray
-    parts: list[Part]
+    parts: list[SpectrumPart]
     back: ComplexArray
 
-    def fits(self, clock: Clock, parts: Sequence[Part]) -> list[LocalFit]:
+    def fits(self, clock: OutputClock, parts: Sequence[SpectrumPart]) -> list[LocalFit]:
         Y, Z = (self.back * one for one in spectrum(self.output, self.grid, clock.error))
         freq = self.grid.freq_hz
         return [fit_local(part, freq, self.X, Y, Z) for part in parts]
 
-    def improved(self, clock: Clock, parts: Sequence[Part]) -> Clock:
+    def improved(self, clock: OutputClock, parts: Sequence[SpectrumPart]) -> OutputClock:
         """Return the clock after one step."""
         if clock.std == 0.0 or not parts:
             return clock
         told = [one for one in self.fits(clock, parts) if one.spread > _SPREAD * self.grid.length]
         curvature = sum(one.curvature for one in told)
         if not curvature > 0.0:
-            return Clock(clock.error, np.inf)
+            return OutputClock(clock.error, np.inf)
         step = -sum(one.pull for one in told) / curvature
         # A clock has one real number, noise has two parts.
-        return Clock(float(np.clip(clock.error + step, -MOST_APART, MOST_APART)), float(np.sqrt(0.5 / curvature)))
+        return OutputClock(float(np.clip(clock.error + step, -MOST_APART, MOST_APART)), float(np.sqrt(0.5 / curvature)))
 
 
-def common_grid(reference: Series, outputs: Sequence[tuple[Series, float]]) -> Grid:
+def common_grid(reference: Series, outputs: Sequence[tuple[Series, float]]) -> RecordGrid:
     """Return the time in common, in whole samples of the reference, so that its bins are independent.
 
     Parameters
@@ -167,4 +167,4 @@ def common_grid(reference: Series, outputs: Sequence[tuple[Series, float]]) -> G
     if n_freq < _FEWEST_BINS:
         msg = f"expected more time in common of both channels, got {max(length, 0.0):g} s"
         raise ValueError(msg)
-    return Grid(start, length, n_freq)
+    return RecordGrid(start, length, n_freq)

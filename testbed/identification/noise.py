@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from testbed.identification.local import fit_local
-from testbed.identification.matching import Clock, common_grid
-from testbed.identification.response import Floor
+from testbed.identification.matching import OutputClock, common_grid
+from testbed.identification.response import NoiseFloor
 from testbed.identification.spectrum import Series, spectrum
-from testbed.identification.windows import windows
+from testbed.identification.windows import spectrum_parts
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -37,7 +37,7 @@ class Heard(NamedTuple):
     """An output, its clock, and the delay that is taken off before the fits [s]."""
 
     series: Series
-    clock: Clock
+    clock: OutputClock
     lag: float
 
 
@@ -46,9 +46,9 @@ class ThreeFloors(NamedTuple):
     zero.
     """
 
-    reference: Floor
-    first: Floor
-    second: Floor
+    reference: NoiseFloor
+    first: NoiseFloor
+    second: NoiseFloor
     evidence: float
 
 
@@ -69,7 +69,7 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
     """
     grid = common_grid(reference, [(one.series, one.clock.error) for one in (first, second)])
     freq, X = grid.freq_hz, spectrum(reference, grid)[0]
-    parts = windows(np.abs(X) ** 2)
+    parts = spectrum_parts(np.abs(X) ** 2)
     both = []
     for one in (first, second):
         Y, Z = (np.exp(2j * np.pi * freq * one.lag) * part for part in spectrum(one.series, grid, one.clock.error))
@@ -83,7 +83,7 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
     middle, freedom = (
         np.array([getattr(one, name) for one in both[0]], dtype=float) for name in ("freq_hz", "freedom")
     )
-    own, a_floor, b_floor = (Floor(middle, row / grid.length, freedom) for row in np.array(levels).T)
+    own, a_floor, b_floor = (NoiseFloor(middle, row / grid.length, freedom) for row in np.array(levels).T)
     return ThreeFloors(own, a_floor, b_floor, float(np.sum(evidence) / np.sqrt(len(evidence))))
 
 
@@ -104,7 +104,7 @@ class NoiseFit(NamedTuple):
         return value
 
 
-def fit_noise(floor: Floor, gain: FloatArray, *, slow_before: bool) -> NoiseFit:
+def fit_noise(floor: NoiseFloor, gain: FloatArray, *, slow_before: bool) -> NoiseFit:
     r"""Return white noise before and behind the dynamics and 1/f noise that fit a floor.
 
     .. math:: S(f) = |G|^2 a + b + c / f, \quad a, b, c \ge 0
@@ -113,7 +113,7 @@ def fit_noise(floor: Floor, gain: FloatArray, *, slow_before: bool) -> NoiseFit:
 
     Parameters
     ----------
-    floor : Floor
+    floor : NoiseFloor
         Of the reading; densities at or below zero are left out.
     gain : ndarray, shape (n_freq,)
         |G| at its frequencies [-].

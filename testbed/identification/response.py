@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
-from testbed.identification.matching import Clock, Matched, match
+from testbed.identification.matching import Matched, OutputClock, match
 
 if TYPE_CHECKING:
     from testbed.identification.local import LocalFit
-    from testbed.identification.spectrum import Grid, Series
+    from testbed.identification.spectrum import RecordGrid, Series
     from testbed.signals import ComplexArray, FloatArray
 
 # The chance of an answer where there is none, over all parts, and over the clocks and lags that were tried beforehand.
@@ -37,7 +37,7 @@ class FrequencyResponse:
         Derivative of the response by the clock's error [-].
     coherence : ndarray, shape (n_freq,)
         Share of the output there that follows the reference [-].
-    clock : Clock
+    clock : OutputClock
         Of the output.
     length : float
         Of the record [s].
@@ -49,7 +49,7 @@ class FrequencyResponse:
     freedom: FloatArray
     slope: ComplexArray
     coherence: FloatArray
-    clock: Clock
+    clock: OutputClock
     length: float
 
     @property
@@ -79,7 +79,7 @@ class FrequencyResponse:
 
 
 @dataclass(frozen=True)
-class Floor:
+class NoiseFloor:
     """What the output has beside what follows the reference.
 
     Parameters
@@ -105,7 +105,7 @@ class Measured:
     ----------
     response : FrequencyResponse
         Where the output follows; no frequency if it does so nowhere.
-    noise : Floor
+    noise : NoiseFloor
         Of the output.
     lag : float
         Delay that was taken off before the fits [s].
@@ -115,13 +115,13 @@ class Measured:
     """
 
     response: FrequencyResponse
-    noise: Floor
+    noise: NoiseFloor
     lag: float
     unfollowed: tuple[float, ...]
     mains: tuple[float, ...]
 
 
-def measure(reference: Series, output: Series, *, one_clock: bool = False) -> Measured:
+def measure_response(reference: Series, output: Series, *, one_clock: bool = False) -> Measured:
     """Return the response of an output to a reference.
 
     Parameters
@@ -160,10 +160,10 @@ def _response(used: list[LocalFit], found: Matched) -> FrequencyResponse:
     )
 
 
-def _floor(found: Matched, limit: float) -> Floor:
+def _floor(found: Matched, limit: float) -> NoiseFloor:
     """Return the noise: what does not follow, or all where nothing does."""
     level = [one.noise if one.chance < limit else one.power for one in found.fits]
-    return Floor(
+    return NoiseFloor(
         np.array([one.freq_hz for one in found.fits]),
         np.array(level) / found.grid.length,
         np.array([one.freedom for one in found.fits], dtype=float),
@@ -174,7 +174,7 @@ def _floor(found: Matched, limit: float) -> Floor:
 _OTHERS, _WANDER, _MOST_HARMONICS = 3, 2e-3, 20
 
 
-def _mains(follows: list[LocalFit], grid: Grid) -> list[float]:
+def _mains(follows: list[LocalFit], grid: RecordGrid) -> list[float]:
     """Return lines at multiples of 50 and 60 Hz where the rest of the excitation is no lines."""
     suspect = [one.freq_hz for one in follows if one.is_line and _is_mains(one.freq_hz, grid.length)]
     others = sum(one.is_line for one in follows) - len(suspect)

@@ -10,7 +10,7 @@ import numpy as np
 from testbed.identification.channels import of_one_clock, series_of
 from testbed.identification.model import SensorModel, fit_model
 from testbed.identification.noise import Heard, NoiseFit, fit_noise, three_floors
-from testbed.identification.response import Measured, measure
+from testbed.identification.response import Measured, measure_response
 from testbed.identification.words import refusal_of
 from testbed.logs.inspection import word_of
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from testbed.fusion.belief import SensorBelief
     from testbed.identification.channels import Prepared
-    from testbed.identification.response import Floor
+    from testbed.identification.response import NoiseFloor
     from testbed.logs.channel import Log, LogChannel
 
 # Digits of what a belief file holds: the noise of any record leaves fewer.
@@ -39,7 +39,7 @@ class Identification:
         Response and noise.
     model : SensorModel
         What was fitted to the response.
-    floor : Floor
+    floor : NoiseFloor
         Noise of the reading [rad^2/s]: the output's own where there are two outputs, else with the reference's.
     noise : NoiseFit
         What was fitted to it.
@@ -52,7 +52,7 @@ class Identification:
     name: str
     measured: Measured
     model: SensorModel
-    floor: Floor
+    floor: NoiseFloor
     noise: NoiseFit
     belief: SensorBelief
     notes: tuple[str, ...]
@@ -111,7 +111,7 @@ def identify_channels(
     for channel, one in zip(outputs, prepared, strict=True):
         shared = one_clock or of_one_clock(reference, channel)
         try:
-            found = measure(inner.series, one.series, one_clock=shared)
+            found = measure_response(inner.series, one.series, one_clock=shared)
         except ValueError as error:
             raise refusal_of(reference, channel, str(error)) from error
         if not found.response.freq_hz.size or not np.isfinite(found.response.clock.std):
@@ -124,7 +124,7 @@ def identify_channels(
     ]
 
 
-def _floors(inner: Prepared, prepared: Sequence[Prepared], measured: Sequence[Measured]) -> list[Floor]:
+def _floors(inner: Prepared, prepared: Sequence[Prepared], measured: Sequence[Measured]) -> list[NoiseFloor]:
     """Return the noise of each output, by itself where another one tells it from the reference's."""
     if len(prepared) == 1:
         return [measured[0].noise]
@@ -135,7 +135,7 @@ def _floors(inner: Prepared, prepared: Sequence[Prepared], measured: Sequence[Me
 
 
 def _identified(
-    channel: LogChannel, prepared: Prepared, measured: Measured, floor: Floor, inner: Prepared
+    channel: LogChannel, prepared: Prepared, measured: Measured, floor: NoiseFloor, inner: Prepared
 ) -> Identification:
     if measured.response.freq_hz.size < 2:
         raise refusal_of(

@@ -40,13 +40,13 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Grid:
+class RecordGrid:
     """The frequencies that a record of some length tells apart: multiples of its inverse.
 
     Parameters
     ----------
     start, length : float
-        Part of the record, by the clock of the reference [s].
+        SpectrumPart of the record, by the clock of the reference [s].
     n_freq : int
         Their number, from 1/length on.
     """
@@ -62,7 +62,7 @@ class Grid:
         return freq
 
 
-def spectrum(series: Series, grid: Grid, clock: float = 0.0) -> tuple[ComplexArray, ComplexArray]:
+def spectrum(series: Series, grid: RecordGrid, clock: float = 0.0) -> tuple[ComplexArray, ComplexArray]:
     r"""Return the Fourier transform of a rate over a part of the record, and its derivative by the clock.
 
     .. math:: X(f) = (1 + e) T \sum_k x_k e^{-2 \pi i f t_k}, \quad t_k = (1 + e) t'_k
@@ -77,8 +77,8 @@ def spectrum(series: Series, grid: Grid, clock: float = 0.0) -> tuple[ComplexArr
     ----------
     series : Series
         Of the channel.
-    grid : Grid
-        Part of the record and frequencies.
+    grid : RecordGrid
+        SpectrumPart of the record and frequencies.
     clock : float, optional
         e [-].
 

@@ -23,7 +23,7 @@ _STANDS, _OWN = 30.0, 1
 _SHORTEST, _WEAK = 50.0, 0.03
 
 
-class Part(NamedTuple):
+class SpectrumPart(NamedTuple):
     """A part of a spectrum.
 
     Parameters
@@ -41,7 +41,7 @@ class Part(NamedTuple):
     is_line: bool
 
 
-def windows(power: FloatArray) -> list[Part]:
+def spectrum_parts(power: FloatArray) -> list[SpectrumPart]:
     """Return parts of a spectrum, each around its strongest bin, in the order of frequency.
 
     Lines that stand alone have a narrow part each, which may reach into a neighbour's; all else is divided into parts
@@ -61,7 +61,7 @@ def windows(power: FloatArray) -> list[Part]:
     left = np.where(free, power, 0.0)
     while left.any():
         peak = int(np.argmax(left))
-        found[peak] = Part(np.arange(low[peak], high[peak]), peak, is_line=False)
+        found[peak] = SpectrumPart(np.arange(low[peak], high[peak]), peak, is_line=False)
         left[(high > low[peak]) & (low < high[peak])] = 0.0
     peaks = np.array(list(found), dtype=int)
     return [found[peak] for peak in sorted(found) if not _spilled(peak, peaks, power)]
@@ -75,14 +75,14 @@ def _ends(n_freq: int) -> tuple[np.ndarray, np.ndarray]:
     return low, low + 2 * half + 1
 
 
-def _line(peak: int, lines: np.ndarray) -> Part:
+def _line(peak: int, lines: np.ndarray) -> SpectrumPart:
     """Return the part around a line; what others have there says nothing of the response at this one."""
     low = max(peak - _FEWEST, 0)
     bins = np.arange(low, low + 2 * _FEWEST + 1)
     others = lines[lines != peak]
     apart = np.abs(bins[:, None] - others[None, :]).min(axis=1, initial=bins[-1] + 1)
     kept = bins[(apart > _OWN) | (np.abs(bins - peak) <= _OWN)]
-    return Part(kept if kept.size >= _LEAST else bins, peak, is_line=True)
+    return SpectrumPart(kept if kept.size >= _LEAST else bins, peak, is_line=True)
 
 
 def _stands(power: FloatArray) -> np.ndarray:

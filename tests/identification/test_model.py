@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from testbed.identification.matching import Clock
+from testbed.identification.matching import OutputClock
 from testbed.identification.model import fit_model
-from testbed.identification.response import FrequencyResponse, measure
+from testbed.identification.response import FrequencyResponse
 from testbed.signals import transfer
 from tests.identification.records import DENOMINATOR, EXCITATIONS, NUMERATOR, record
 
@@ -20,7 +20,7 @@ def measured(true, rng, std=1e-3):
     error = std * (rng.standard_normal(true.size) + 1j * rng.standard_normal(true.size)) / np.sqrt(2.0)
     return FrequencyResponse(
         FREQ, true + error, np.full(FREQ.size, std**2), np.full(FREQ.size, 50.0), np.zeros(FREQ.size, complex),
-        np.ones(FREQ.size), Clock(0.0, 0.0), 60.0,
+        np.ones(FREQ.size), OutputClock(0.0, 0.0), 60.0,
     )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def test_coefficients_and_delay_scatter_as_their_covariance_says():
 @pytest.mark.parametrize("name", EXCITATIONS)
 def test_the_dead_time_is_found_to_10_us(name):
     one = record(EXCITATIONS[name], 7, length=30.0)
-    fit = fit_model(measure(one.reference, one.output).response)
+    fit = fit_model(measure_response(one.reference, one.output).response)
     assert abs(fit.delay - one.delay) < 10e-6
     assert fit.delay_std < 10e-6
 
@@ -71,6 +71,6 @@ def test_a_sensor_that_sees_a_constant_is_not_made_blind(rng):
 
 
 def test_one_frequency_is_too_few():
-    one = FrequencyResponse(*(np.ones(1) for _ in range(6)), Clock(0.0, 0.0), 1.0)
+    one = FrequencyResponse(*(np.ones(1) for _ in range(6)), OutputClock(0.0, 0.0), 1.0)
     with pytest.raises(ValueError, match="two frequencies or more"):
         fit_model(one)

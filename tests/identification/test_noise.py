@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from testbed.identification.matching import Clock
+from testbed.identification.matching import OutputClock
 from testbed.identification.noise import Heard, fit_noise, three_floors
-from testbed.identification.response import Floor, measure
+from testbed.identification.response import NoiseFloor
 from testbed.identification.spectrum import Series
 from tests.identification.records import REFERENCE_HZ, noise
 
@@ -29,8 +29,8 @@ def test_two_alike_look_twice_as_noisy_and_three_do_not():
     """
     reference, first, second = three_alike(1)
     true = STD**2 / REFERENCE_HZ
-    same = Clock(0.0, 0.0)
-    two = measure(reference, first, one_clock=True).noise
+    same = OutputClock(0.0, 0.0)
+    two = measure_response(reference, first, one_clock=True).noise
     three = three_floors(reference, Heard(first, same, 0.0), Heard(second, same, 0.0))
     below = two.freq_hz < 100.0
     ratio = np.average(two.density[below], weights=two.freedom[below]) / true
@@ -47,7 +47,7 @@ def test_a_reference_without_noise_shows_none():
     rng = np.random.default_rng(2)
     t = np.arange(round(30.0 * 20_000)) / 20_000.0
     clean = Series(noise(t, rng)[:: round(20_000 / REFERENCE_HZ)], 0.0, REFERENCE_HZ)
-    same = Clock(0.0, 0.0)
+    same = OutputClock(0.0, 0.0)
     found = three_floors(clean, Heard(first, same, 0.0), Heard(second, same, 0.0))
     assert abs(found.evidence) < 3.5
 
@@ -62,7 +62,7 @@ def test_white_and_slow_noise_come_back(before):
     """Values of a density scatter by one in the square root of half their freedom; exact ones give exact levels."""
     white, behind, slow = (3e-5) ** 2, (2e-6) ** 2, 1e-10
     density = GAIN**2 * white + behind + (GAIN**2 if before else 1.0) * slow / FREQ
-    found = fit_noise(Floor(FREQ, density, np.full(60, 20.0)), GAIN, slow_before=before)
+    found = fit_noise(NoiseFloor(FREQ, density, np.full(60, 20.0)), GAIN, slow_before=before)
     assert found.inner == pytest.approx(3e-5, rel=1e-6, abs=0.0)
     assert found.outer == pytest.approx(2e-6, rel=1e-6, abs=0.0)
     if before:
