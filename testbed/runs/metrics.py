@@ -258,13 +258,16 @@ class ChannelMetrics(Entry):
 
 
 class ReplayMetrics(Entry):
-    """What was replayed: the recording, its channels, whether it has a reference, and how its clocks go together."""
+    """What was replayed: the recording, its channels, whether it has a reference and which, and how its clocks go
+    together.
+    """
 
     log: str
     format: str
     reference: bool
     clock: str
     channels: dict[str, ChannelMetrics]
+    reference_channel: ChannelMetrics | None = None
     start_ns: int | None = None
     notes: list[str] = []
 
