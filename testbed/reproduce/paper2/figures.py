@@ -119,8 +119,8 @@ def draw_bode(table: Table) -> Figure:
 def draw_following(table: Table) -> Figure:
     """Draw one of figures 7 to 9 from the table of `following`: rates above, error of the fused one below."""
     figure, (rates, error) = panels(3.8, 2)
-    for name, style in (("rate", {"linewidth": 2.2}), *((name, {"linewidth": 1.0}) for name in SENSORS)):
-        rates.plot(table["t"], table[name], color=COLORS[name], **style)
+    for name in ("rate", *SENSORS):
+        rates.plot(table["t"], table[name], color=COLORS[name], linewidth=2.2 if name == "rate" else 1.0)
     rates.plot(table["t"], table["fused"], color=COLORS["fused"], linewidth=1.2, linestyle=DOTTED)
     error.plot(table["t"], table["fused"] - table["rate"], color=COLORS["fused"], linewidth=0.9)
     rates.set_ylabel("rate [deg/s]")
