@@ -372,4 +372,5 @@ def _write_rivals(path: Path, rows: list[tuple[str, str, str, str, list[tuple[fl
         writer = csv.writer(file)
         writer.writerow(["name", "band", "gain_quoted", "phase_quoted", *errors])
         for *words, ours in rows:
-            writer.writerow([*words, *([value for each in ours for value in each] or [""] * len(errors))])
+            values = [value for each in ours for value in each]
+            writer.writerow([*words, *map(str, values), *[""] * (len(errors) - len(values))])
