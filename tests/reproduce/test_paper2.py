@@ -26,8 +26,8 @@ from testbed.reproduce.paper2 import (
     report,
     switched_on,
 )
-from testbed.reproduce.paper2.figures import bode, following
-from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, compared, lines_of, worst
+from testbed.reproduce.paper2.figures import both_responses, followed
+from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, rival_lines, table_filters, worst
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ
 
@@ -280,15 +280,15 @@ def test_worst_errors_are_those_of_the_band() -> None:
 
 def test_the_table_prints_what_is_quoted_and_what_is_ours() -> None:
     rows = [(rival.name, "0.1-40 Hz", rival.gain, rival.phase, []) for rival in RIVALS]
-    text = "\n".join(lines_of([*rows, ("kalman", "", "", "", [(0.1, 0.01, 1.15)] * 3)]))
+    text = "\n".join(rival_lines([*rows, ("kalman", "", "", "", [(0.1, 0.01, 1.15)] * 3)]))
     for words in ("1 deg", "34 deg", "2.1 dB", "0.100 %", "1.15 deg"):
         assert words in text
-    assert {"kalman", "wideband", "complementary", "allan_srkf"} <= set(compared())
+    assert {"kalman", "wideband", "complementary", "allan_srkf"} <= set(table_filters())
 
 
 @pytest.mark.oracle
 def test_figure_2_shows_the_sensors_and_what_is_believed_of_them() -> None:
-    table = bode()
+    table = both_responses()
     np.testing.assert_array_equal(table["mhd_ars_gain"], np.abs(mhd_response(table["frequency_hz"])))
     band = (table["frequency_hz"] > 0.1) & (table["frequency_hz"] < 500.0)
     ratio = table["mhd_ars_believed_gain"][band] / table["mhd_ars_gain"][band]
@@ -297,7 +297,7 @@ def test_figure_2_shows_the_sensors_and_what_is_believed_of_them() -> None:
 
 
 def test_figures_7_to_9_follow_a_sine_of_one_radian_per_second() -> None:
-    table = following(lambda rate: bench_readings(rate, 1, switched_on()), 50.0)
+    table = followed(lambda rate: bench_readings(rate, 1, switched_on()), 50.0)
     assert table["t"].size > 500
     assert np.ptp(table["t"]) == pytest.approx(3.0 / 50.0, rel=0.01)
     assert np.abs(table["rate"]).max() == pytest.approx(np.degrees(1.0), rel=1e-3)

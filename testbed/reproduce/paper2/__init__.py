@@ -16,8 +16,8 @@ import numpy as np
 from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.metrics.spectra import WelchDensity, log_average
-from testbed.reproduce.paper2.figures import write_figures
-from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, lines_of, table
+from testbed.reproduce.paper2.figures import write_pictures
+from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, rival_lines, rival_rows
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import DEG
@@ -305,10 +305,10 @@ def report(seeds: int, out: Path, protocol: BenchProtocol | None = None, **param
     freq, density = noise[0][0], np.median([value for _, value in noise], axis=0)
     columns = ["frequency_hz", *(f"{name}_rad2_s" for name in (*CHANNELS, "mhd_ars_input_referred"))]
     _write(out / "noise_psd.csv", columns, freq, density)
-    rows = list(table(1, protocol.sines))
+    rows = list(rival_rows(1, protocol.sines))
     _write_rivals(out / "rivals.csv", rows)
-    yield from lines_of(rows)
-    yield from write_figures(lambda rate: bench_readings(rate, 1, switched_on(**parameters)), freq, density, out)
+    yield from rival_lines(rows)
+    yield from write_pictures(lambda rate: bench_readings(rate, 1, switched_on(**parameters)), freq, density, out)
     yield ""
     yield from _claims(protocol, scale[:, 2], linear, freq, density)
 

@@ -40,7 +40,7 @@ FOLLOWED_HZ = {"figure_7": 0.5, "figure_8": 5.0, "figure_9": 50.0}
 SHOWN_PERIODS, BEFORE_S = 3.0, 1.0
 
 
-def write_figures(
+def write_pictures(
     read: Callable[[FloatArray], Mapping[str, FloatArray]], freq_hz: FloatArray, density: FloatArray, out: Path
 ) -> Iterator[str]:
     """Write every picture as SVG and PNG beside its numbers, and yield a line for each.
@@ -62,15 +62,15 @@ def write_figures(
         One line.
     """
     yield "figures (SVG and PNG, the numbers in CSV)"
-    yield _write(out, "figure_2", bode(), draw_bode)
+    yield _write(out, "figure_2", both_responses(), draw_both_responses)
     for name, freq in FOLLOWED_HZ.items():
-        yield _write(out, name, following(read, freq), draw_following)
+        yield _write(out, name, followed(read, freq), draw_followed)
     columns = ("mems_gyro", "mhd_ars", "fused", "mhd_ars_input_referred")
     noise = {"frequency_hz": freq_hz} | dict(zip(columns, density.T, strict=True))
     yield _write(out, "figure_11", noise, draw_noise)
 
 
-def bode() -> Table:
+def both_responses() -> Table:
     """Return figure 2: gain [-] and phase [deg] of both sensors and of what the belief `paper2` holds of them."""
     freq = np.geomspace(0.01, 1000.0, 251)
     believed, found = load_belief("paper2"), {"frequency_hz": freq}
@@ -84,7 +84,7 @@ def bode() -> Table:
     return found
 
 
-def following(read: Callable[[FloatArray], Mapping[str, FloatArray]], freq_hz: float) -> Table:
+def followed(read: Callable[[FloatArray], Mapping[str, FloatArray]], freq_hz: float) -> Table:
     """Return three periods of a sine of 1 rad/s, readings and fused rate [deg/s], a second and more after the start."""
     first = round(max(BEFORE_S, 1.0 / freq_hz) * BASE_RATE_HZ)
     t = np.arange(first + round(SHOWN_PERIODS / freq_hz * BASE_RATE_HZ)) / BASE_RATE_HZ
@@ -96,8 +96,8 @@ def following(read: Callable[[FloatArray], Mapping[str, FloatArray]], freq_hz: f
 
 
 @mpl.rc_context(PRINT)
-def draw_bode(table: Table) -> Figure:
-    """Draw figure 2 from the table of `bode`."""
+def draw_both_responses(table: Table) -> Figure:
+    """Draw figure 2 from the table of `both_responses`."""
     figure, (gain, phase) = panels(4.2, 2)
     for name in SENSORS:
         for suffix, style in (("", {"linewidth": 1.3}), ("_believed", {"linewidth": 1.0, "linestyle": LIMIT})):
@@ -116,8 +116,8 @@ def draw_bode(table: Table) -> Figure:
 
 
 @mpl.rc_context(PRINT)
-def draw_following(table: Table) -> Figure:
-    """Draw one of figures 7 to 9 from the table of `following`: rates above, error of the fused one below."""
+def draw_followed(table: Table) -> Figure:
+    """Draw one of figures 7 to 9 from the table of `followed`: rates above, error of the fused one below."""
     figure, (rates, error) = panels(3.8, 2)
     for name in ("rate", *SENSORS):
         rates.plot(table["t"], table[name], color=COLORS[name], linewidth=2.2 if name == "rate" else 1.0)

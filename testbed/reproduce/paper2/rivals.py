@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from testbed.signals import ComplexArray, FloatArray
 
+    Row = tuple[str, str, str, str, list[tuple[float, float, float]]]
+
 SENSORS = {"mems_gyro": "crs03", "mhd_ars": "mhd03"}
 
 
@@ -70,7 +72,7 @@ class SineProtocol:
     observe: float = 1.0
 
 
-def compared() -> list[str]:
+def table_filters() -> list[str]:
     """Return the filters of the table: all that need no choice of another one in them."""
     return [name for name in FILTERS if not any(field.is_required() for field in _fields(name).values())]
 
@@ -80,7 +82,7 @@ def _fields(name: str) -> dict[str, Any]:
     return dict(resolve("filter", name, FILTERS).Parameters.model_fields)
 
 
-def responses(seed: int, protocol: SineProtocol) -> dict[str, ComplexArray]:
+def fused_lines(seed: int, protocol: SineProtocol) -> dict[str, ComplexArray]:
     """Return fused over true rate at every frequency, by filter.
 
     Parameters
@@ -95,7 +97,7 @@ def responses(seed: int, protocol: SineProtocol) -> dict[str, ComplexArray]:
     dict of str to ndarray of complex, shape (n_freq,)
         Indicated over true line [-]; an offset and a drift of the estimate are taken off.
     """
-    found: dict[str, list[complex]] = {name: [] for name in compared()}
+    found: dict[str, list[complex]] = {name: [] for name in table_filters()}
     clock, belief = dict.fromkeys(SENSORS, BASE_RATE_HZ), load_belief("paper2")
     for i, freq in enumerate(protocol.frequencies):
         first = round(max(protocol.settle, 1.0 / freq) * BASE_RATE_HZ)
@@ -145,7 +147,7 @@ def worst(response: ComplexArray, freq_hz: FloatArray, band: tuple[float, float]
     )
 
 
-def table(seed: int, protocol: SineProtocol) -> Iterator[tuple[str, str, str, str, list[tuple[float, float, float]]]]:
+def rival_rows(seed: int, protocol: SineProtocol) -> Iterator[Row]:
     """Yield the rows of the table: one per published result and per filter.
 
     Parameters
@@ -164,17 +166,17 @@ def table(seed: int, protocol: SineProtocol) -> Iterator[tuple[str, str, str, st
     for rival in RIVALS:
         yield rival.name, f"{rival.band[0]:g}-{rival.band[1]:g} Hz", rival.gain, rival.phase, []
     freq = np.array(protocol.frequencies)
-    for name, response in responses(seed, protocol).items():
+    for name, response in fused_lines(seed, protocol).items():
         yield name, "", "", "", [worst(response, freq, rival.band) for rival in RIVALS]
 
 
-def lines_of(rows: list[tuple[str, str, str, str, list[tuple[float, float, float]]]]) -> Iterator[str]:
+def rival_lines(rows: list[Row]) -> Iterator[str]:
     """Yield the table as it is printed.
 
     Parameters
     ----------
     rows : list of tuple
-        As from `table`.
+        As from `rival_rows`.
     """
     yield "worst error of gain and phase over the band (rivals.csv): ours in the bands of the three quoted results"
     for name, band, gain, phase, ours in rows:
