@@ -48,7 +48,7 @@ def open_sinks(stack: ExitStack, folder: Path, scenario: Scenario, chain: Chain,
     sinks: list[Sink] = []
     if "netcdf" in outputs:
         attributes = provenance(scenario.name, scenario.frame.seed, versions())
-        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes)
+        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes, chain.times)
         stack.callback(netcdf.close)
         sinks.append(netcdf)
     if "recording" in outputs:
@@ -65,6 +65,7 @@ def open_sinks(stack: ExitStack, folder: Path, scenario: Scenario, chain: Chain,
             model=chain.turntable.model,
             settle=scenario.frame.settle,
             detail=scenario.detail,
+            times_ns=chain.time_ns,
         )
         sinks.append(stack.enter_context(recording))
     return sinks
