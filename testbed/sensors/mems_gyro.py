@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rounding_psd
+from testbed.sensors.base import Decimator, Sensor, Surroundings
+from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word, low_pass_schema
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
