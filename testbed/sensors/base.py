@@ -19,7 +19,7 @@ from pydantic import (
 
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
-from testbed.sensors.clock import Clock, Ticks, TickSampler, ticks_of
+from testbed.sensors.clock import OwnClock, Ticks, TickSampler, ticks_of
 from testbed.sensors.data_sheet import Sheet, Word
 from testbed.sensors.faults import Fault, FaultStage, first_overlap
 from testbed.sensors.losses import Losses, LossStage
@@ -118,7 +118,7 @@ class Sensor(Part):
     ----------
     sample_rate : float
         Rate of the readings [Hz]; reading j is at t = j / sample_rate by its clock.
-    clock : Clock, optional
+    clock : OwnClock, optional
         A clock of its own, such as ``{error: 20 ppm, walk: 1 us, offset: 1 ms}``; left out, the run's.
     noise : bool
         Off: nothing random and no rounding, so that a run can be exact; the dynamics, the constant errors and the
@@ -141,7 +141,7 @@ class Sensor(Part):
     """It can read at any instants, not only at samples of the run."""
 
     sample_rate: SampleRate
-    clock: Clock | None = None
+    clock: OwnClock | None = None
     noise: bool = True
     mounting: Mounting = Mounting()
     faults: tuple[Fault, ...] = ()

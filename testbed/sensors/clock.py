@@ -20,7 +20,7 @@ ClockError = Annotated[float, Quantity("", "20 ppm", above=-0.1, at_most=0.1)]
 _CHUNK = 4096
 
 
-class Clock(Part):
+class OwnClock(Part):
     r"""A clock of a sensor's own, as the logger sees it.
 
     .. math:: t_j = \frac{j}{f (1 + e)} + w_j, \quad \mathrm{stamp}_j = t_j + d,
@@ -47,7 +47,7 @@ class Ticks:
 
     Parameters
     ----------
-    clock : Clock
+    clock : OwnClock
         Its clock.
     sample_rate_hz : float
         Rate of the readings by that clock [Hz].
@@ -55,7 +55,7 @@ class Ticks:
         Of the random walk.
     """
 
-    def __init__(self, clock: Clock, sample_rate_hz: float, stream: np.random.Generator) -> None:
+    def __init__(self, clock: OwnClock, sample_rate_hz: float, stream: np.random.Generator) -> None:
         self._rate, self._step = sample_rate_hz * (1.0 + clock.error), clock.walk / sample_rate_hz**0.5
         self._stream, self._walked, self._made = stream, 0.0, 0
         self._waiting: FloatArray = np.empty(0)
@@ -126,12 +126,12 @@ class TickSampler:
         return taken
 
 
-def ticks_of(clock: Clock | None, sample_rate_hz: float, seed: int, name: str) -> Ticks:
+def ticks_of(clock: OwnClock | None, sample_rate_hz: float, seed: int, name: str) -> Ticks:
     """Return when an instrument reads.
 
     Parameters
     ----------
-    clock : Clock, optional
+    clock : OwnClock, optional
         Its clock; the run's if not given.
     sample_rate_hz : float
         Rate of the readings [Hz].
@@ -140,10 +140,10 @@ def ticks_of(clock: Clock | None, sample_rate_hz: float, seed: int, name: str) -
     name : str
         Of the instance, the owner of its random streams.
     """
-    return Ticks(clock or Clock(), sample_rate_hz, random_stream(seed, name, "clock"))
+    return Ticks(clock or OwnClock(), sample_rate_hz, random_stream(seed, name, "clock"))
 
 
-def stamps_ns(clock: Clock | None, times: FloatArray) -> NDArray[np.int64]:
+def stamps_ns(clock: OwnClock | None, times: FloatArray) -> NDArray[np.int64]:
     """Return what the logger writes for readings taken at `times` [s], shape (n_time,), as whole nanoseconds."""
     late = 0.0 if clock is None else clock.offset
     return np.rint(1e9 * (times + late)).astype(np.int64)
