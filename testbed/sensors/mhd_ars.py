@@ -13,7 +13,8 @@ from testbed.models.mhd_channel.linear_range import linear_range
 from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
-from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.base import Sensor, Surroundings
+from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
@@ -74,6 +75,7 @@ class MhdArs(Sensor, ElectronicTerms):
     which is two-sided; see `testbed.sensors.data_sheet`.
     """
 
+    any_clock = True
     words: ClassVar[tuple[Word, ...]] = (
         OUTPUT_RATE,
         replace(RATE_NOISE_DENSITY, field="noise_density", shown="nrad/s/sqrt(Hz)"),
@@ -183,7 +185,7 @@ class MhdArsStage:
     """An MHD angular rate sensor in time; made by `MhdArs.start`. `heights` [m] are the points of its `profile`."""
 
     def __init__(self, sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> None:
-        self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
+        self._decimator = sensor.sampler(input_rate_hz, seed, name)
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
         self._gain, self._first = sensor.channel_gain, np.nan
