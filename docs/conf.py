@@ -54,11 +54,15 @@ html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,
+    # Sixty pages do not fit into a bar; they stand beside each page, under the headings of index.md.
+    "navbar_center": [],
+    "globaltoc_includehidden": True,
     "navbar_end": ["theme-switcher"],
     "footer_start": [],
     "footer_end": [],
     "secondary_sidebar_items": ["page-toc"],
 }
+html_sidebars = {"**": ["globaltoc.html"]}
 linkcheck_timeout = 20
 
 sphinx_gallery_conf = {
