@@ -49,6 +49,7 @@ copybutton_prompt_is_regexp = True
 mathjax_path = "mathjax/tex-svg.js"
 html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"testbed {release}"
 html_show_sourcelink = False
 html_theme_options = {
