@@ -18,6 +18,7 @@ from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
 from testbed.logs.reader import is_map
 from testbed.notebook import Run, open_run
+from testbed.playback.cross import sensor_agreement
 from testbed.playback.description import description
 from testbed.playback.filters import filter_specs
 from testbed.playback.judge import ReplayJudge
@@ -283,6 +284,7 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
             "replay": made.facts,
             "findings": [finding_entry(one) for one in made.verdict.findings],
             "undecided": list(made.verdict.undecided),
+            "cross": sensor_agreement(lineup, next(iter(made.specs.values())).belief, made.settle),
             "versions": versions(),
         }
     )

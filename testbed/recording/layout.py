@@ -79,6 +79,7 @@ def blueprint(
     rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
     rates = [rate for rate in rates if rate in entities] + [f"/fusion/{n}/rate" for n in filters]
     truth_and_filters = [rate for rate in rates if rate.startswith(("/truth", "/fusion"))]
+    estimated = "Truth and estimates" if "/truth/rate" in rates else "Estimates"
     least = FEWEST / clock.sample_rate_hz
     zoom, around = (window[0], min(window[0] + max(SHOWN, least), duration)), max(ZOOM, 0.5 * least)
     span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
@@ -93,7 +94,7 @@ def blueprint(
             [
                 _plot(f"Rate, {span} [rad/s]", rates, zoom),
                 _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
-                _plot("Truth and estimates [rad/s]", truth_and_filters, (0.0, duration)),
+                _plot(f"{estimated} [rad/s]", truth_and_filters, (0.0, duration)),
             ],
             len(rates),
         ),
