@@ -50,7 +50,7 @@ class Matched:
     Parameters
     ----------
     grid : RecordGrid
-        SpectrumPart of the record and frequencies.
+        Part of the record and frequencies.
     clock : OutputClock
         Of the output.
     lag : float

@@ -86,6 +86,23 @@ def identify_sensors(
     ------
     ScenarioError
         If a channel is not there or is no rotation, or nothing of an output follows the reference: with the reason.
+
+    Examples
+    --------
+    A sensor that reads 0.9 of what a laser does, both in the rows of a file:
+
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> t = np.arange(4000) / 500.0
+    >>> rate = sum(np.sin(2.0 * np.pi * f * t) for f in (3.0, 7.0, 19.0))
+    >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(t.size)
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
+    >>> np.savetxt(path, np.column_stack([t, rate, 0.9 * rate + noise]), header="t [s],laser [deg/s],gyro [deg/s]",
+    ...            comments="", delimiter=",")
+    >>> from testbed.logs import read_log
+    >>> found = identify_sensors(read_log(path), "laser", "gyro")[0]
+    >>> round(found.belief.numerator[0], 3), found.belief.denominator
+    (0.9, (1.0,))
     """
     names = [output] if isinstance(output, str) else list(output)
     return identify_channels(log.channels[input], [log.channels[name] for name in names], one_clock=one_clock)

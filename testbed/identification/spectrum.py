@@ -46,7 +46,7 @@ class RecordGrid:
     Parameters
     ----------
     start, length : float
-        SpectrumPart of the record, by the clock of the reference [s].
+        Part of the record, by the clock of the reference [s].
     n_freq : int
         Their number, from 1/length on.
     """
@@ -78,7 +78,7 @@ def spectrum(series: Series, grid: RecordGrid, clock: float = 0.0) -> tuple[Comp
     series : Series
         Of the channel.
     grid : RecordGrid
-        SpectrumPart of the record and frequencies.
+        Part of the record and frequencies.
     clock : float, optional
         e [-].
 

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from testbed.identification.matching import OutputClock
 from testbed.identification.model import fit_model
-from testbed.identification.response import FrequencyResponse
+from testbed.identification.response import FrequencyResponse, measure_response
 from testbed.signals import transfer
 from tests.identification.records import DENOMINATOR, EXCITATIONS, NUMERATOR, record
 

@@ -7,7 +7,7 @@ import pytest
 
 from testbed.identification.matching import OutputClock
 from testbed.identification.noise import Heard, fit_noise, three_floors
-from testbed.identification.response import NoiseFloor
+from testbed.identification.response import NoiseFloor, measure_response
 from testbed.identification.spectrum import Series
 from tests.identification.records import REFERENCE_HZ, noise
 
