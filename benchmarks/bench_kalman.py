@@ -25,6 +25,7 @@ from testbed.fusion import FILTERS
 from testbed.fusion.belief import default_belief
 from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model import FusionModel, build_model
+from testbed.fusion.transitions import even
 from testbed.parts import resolve
 from testbed.signals import FloatArray, random_stream
 
@@ -121,7 +122,19 @@ def main() -> None:
     kernel = kalman_kernel(5, 2)
 
     def ours() -> None:
-        kernel(np.zeros(5), model.P0.copy(), model.F, model.Q, model.H, model.R, Z, np.zeros(2, dtype=int), False, out)
+        kernel(
+            np.zeros(5),
+            model.P0.copy(),
+            model.F,
+            model.Q,
+            model.H,
+            model.R,
+            Z,
+            even(model.F, model.Q),
+            np.zeros(2, dtype=int),
+            False,
+            out,
+        )
 
     ours()
     ours_us = best(ours, 9) / n * 1e6

@@ -61,5 +61,5 @@ def print_replay(metrics: RunMetrics, verdict: Verdict, folder: Path) -> None:
     print_metrics(metrics, folder)
     if verdict.unfixed:
         names = ", ".join(f"{one.kind} of {one.sensor}" for one in verdict.unfixed)
-        words = f"STANDS AGAINST IT: {names}; the numbers above are worth no more than that"
+        words = f"STANDS AGAINST IT: {names}; read the numbers above in that light"
         console.print(Text(words, "red"), soft_wrap=True)

@@ -2,4 +2,11 @@
 cycles, frozen, and sees temperature only.
 """
 
-PAPER = "paper3"  # names the paper's own protocol where a trained model would stand
+# What stands in the place of a trained model and works on the record that it corrects: the paper's own protocol, and
+# the methods that its Table 2 compares it with.
+LITERATURE = {
+    "paper3": "testbed.compensation.paper3:corrected",
+    "akf22": "testbed.compensation.rivals:akf22",
+    "olmd_kpca": "testbed.compensation.rivals:olmd_kpca",
+    "ceemdan_lwt": "testbed.compensation.rivals:ceemdan_lwt",
+}

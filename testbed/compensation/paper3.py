@@ -168,6 +168,22 @@ def compensate(
     return PaperResult(filtered + signal - drift, drift, filtered, sizes, factor, ratio, search)
 
 
+def corrected(record: GyroRecord) -> FloatArray:
+    """Paper 3's own protocol, trained on the record that it corrects.
+
+    Parameters
+    ----------
+    record : GyroRecord
+        To correct.
+
+    Returns
+    -------
+    ndarray, shape (n_time,)
+        Corrected rate [rad/s].
+    """
+    return compensate(record).rate
+
+
 def _decompose(record: GyroRecord, options: PaperOptions, seed: int, threads: int | None) -> FloatArray:
     from testbed.compensation.ceemdan import ceemdan
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from inspect import getdoc
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from testbed._version import __version__
-from testbed.compensation import PAPER, paper3
+from testbed.compensation import LITERATURE
 from testbed.compensation.document import ModelDocument, sealed
 from testbed.compensation.model_only import METHODS, DriftModel, train
 from testbed.document import findings
@@ -22,6 +23,7 @@ from testbed.drift.records import ThermalRecord, check_options, read_thermal
 from testbed.drift.summary import start_summary
 from testbed.errors import Problem, ScenarioError, UnknownNameError, shortened
 from testbed.inputs.files import read_bytes
+from testbed.parts import resolve
 from testbed.runs.atomic import write_text
 from testbed.runs.folder import RunFolder, failing_as_run_error
 from testbed.units import DEG_H
@@ -29,9 +31,7 @@ from testbed.units import DEG_H
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from testbed.compensation.record import GyroRecord
     from testbed.drift.columns import Columns
-    from testbed.signals import FloatArray
 
 # A rate taken for a temperature moves by less, and so does an oven that was not switched on.
 LEAST_SPAN = 1.0  # K
@@ -222,7 +222,7 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     Parameters
     ----------
     model : str
-        Model file, or `PAPER` for the paper's own protocol, which trains on the record that it corrects.
+        Model file, or a name of `LITERATURE`, which works on the record that it corrects.
     source : Path
         Run folder or text file.
     columns : Columns
@@ -240,13 +240,15 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
         If the disk is full.
     """
     check_options([source], columns)
-    trained = None if model == PAPER else _read_document(Path(model))
+    trained = None if model in LITERATURE else _read_document(Path(model))
     thermal = read_thermal(source, columns)
     with RunFolder(out) as folder, failing_as_run_error(str(out)):
         tell(f"compensating {thermal}")
         try:
             audited = (
-                _audit_paper(thermal, tell) if trained is None else _audit_trained(Path(model), *trained, thermal, tell)
+                _audit_published(model, thermal, tell)
+                if trained is None
+                else _audit_trained(Path(model), *trained, thermal, tell)
             )
         except ValueError as error:
             raise ScenarioError([Problem(str(error), file=str(source))]) from error
@@ -255,13 +257,13 @@ def audit_model(model: str, source: Path, columns: Columns, out: Path, tell: Cal
     return audited
 
 
-def _audit_paper(thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
-    def compensate(record: GyroRecord) -> FloatArray:
-        return paper3.compensate(record).rate
-
+def _audit_published(name: str, thermal: ThermalRecord, tell: Callable[[str], None]) -> Audited:
+    """Audit a method of the literature; the first line of its docstring says what it is."""
+    compensate = resolve("method", name, LITERATURE)
     compensated = compensate(thermal.record)
     found = find_leaks(compensate, thermal.record, compensated, thermal.drift, tell)
-    return Audited("the paper's protocol, trained on this record", thermal, compensated, found)
+    summary = (getdoc(compensate) or name).splitlines()[0].rstrip(".")
+    return Audited(summary, thermal, compensated, found)
 
 
 def _audit_trained(

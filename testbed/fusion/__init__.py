@@ -53,7 +53,8 @@ def estimate(
     name: str | type[Any],
     readings: Mapping[str, ArrayLike],
     *,
-    sample_rate_hz: Mapping[str, float],
+    sample_rate_hz: Mapping[str, float] | None = None,
+    time_ns: Mapping[str, ArrayLike] | None = None,
     belief: Mapping[str, Any] | str | None = None,
     plugins: Iterable[str] = (),
     verdict: bool = True,
@@ -66,10 +67,13 @@ def estimate(
     name : str or type
         Registered filter, a class of one's own, or ``module:Class`` of a plug-in.
     readings : mapping of str to array_like, shape (n_sensor_samples,)
-        Readings of each sensor [rad/s]; all start at t = 0. Not finite means no reading. A sensor at 1/s of the fastest
-        rate has ceil(n / s) readings for n of the fastest; nothing is trimmed.
-    sample_rate_hz : mapping of str to float
-        Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
+        Readings of each sensor [rad/s]. Not finite means no reading. Without stamps all start at t = 0, and a sensor at
+        1/s of the fastest rate has ceil(n / s) readings for n of the fastest; nothing is trimmed.
+    sample_rate_hz : mapping of str to float, optional
+        Rate of each sensor [Hz], in any ratio; beside stamps only about how often it is read, by default as they say.
+    time_ns : mapping of str to array_like of int, shape (n_sensor_samples,), optional
+        Stamps of the readings of each sensor [ns], from any epoch that all share: any clocks, jitter, gaps. They are
+        sorted first; what is regular is filtered as rates are. Rates or stamps have to be given, or both.
     belief : mapping or str, optional
         What the filter believes about each sensor, such as ``{"mhd_ars": testbed.belief_of("mhd03")}``, or the name of
         a shipped belief; default equation (39) with the presets' noise. "exact" is refused: arrays are no simulation.
@@ -84,14 +88,16 @@ def estimate(
     Returns
     -------
     EstimateBlock
-        Rate, standard deviation [rad/s] and diagnostics at the fastest rate, shape (n_time,).
+        Rate, standard deviation [rad/s] and diagnostics at the fastest rate, shape (n_time,); with stamps at those of
+        the fastest sensor, in its `time_ns`.
 
     Raises
     ------
     UnknownNameError
         If no such filter or belief exists.
     ValueError
-        If a parameter, a rate or the length of a record is wrong.
+        If a parameter, a rate, a stamp or the length of a record is wrong, or a filter refuses stamps that are not
+        regular, or rates in such a ratio.
     RunError
         If a filter that is not shipped raises anything, or gives what is no estimate.
 
@@ -105,10 +111,18 @@ def estimate(
     >>> found = estimate("kalman", readings, sample_rate_hz={"mhd_ars": 20e3, "mems_gyro": 2e3}, verdict=False)
     >>> found.rate.shape, bool(np.all(found.rate == 0.0)), bool(found.std[-1] < found.std[0])
     ((20000,), True, True)
+
+    The same with stamps, the gyro's on a clock that is 0.2 % fast and half a millisecond late.
+
+    >>> stamps = {"mhd_ars": np.arange(20_000) * 50_000, "mems_gyro": 500_000 + np.arange(2_000) * 499_000}
+    >>> found = estimate("kalman", readings, time_ns=stamps, verdict=False)
+    >>> found.rate.shape, found.time_ns[-1]
+    ((20000,), np.int64(999950000))
     """
     from testbed.fusion.analysis.verdict import even_stamps
     from testbed.fusion.belief import default_belief, load_belief
     from testbed.fusion.checked import CheckedFilter
+    from testbed.fusion.stamps import rates_of, regular, sorted_by_time
     from testbed.inputs.plugins import load_plugins
     from testbed.parts import resolve
 
@@ -116,11 +130,22 @@ def estimate(
     cls = resolve(kind, name, FILTERS, load_plugins(plugins)) if isinstance(name, str) else name
     believed = default_belief() if belief is None else load_belief(belief)
     model = getattr(cls, "Parameters", dict)
+    if time_ns is not None:
+        readings, time_ns = sorted_by_time(readings, time_ns)
+        sample_rate_hz = rates_of(time_ns) if sample_rate_hz is None else sample_rate_hz
+    if sample_rate_hz is None:
+        msg = "sample_rate_hz: expected the rate of each sensor, or time_ns, the stamps of its readings"
+        raise ValueError(msg)
     inner = cls(believed, sample_rate_hz, model(**parameters))
     label, shipped = (name, name in FILTERS) if isinstance(name, str) else (cls.__qualname__, False)
     stage = CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped)
-    block = stage.process(readings)
-    return _told(block, readings, even_stamps(readings, sample_rate_hz), believed) if verdict else block
+    if time_ns is not None and regular(time_ns, sample_rate_hz):
+        shown = time_ns[max(sample_rate_hz, key=lambda sensor: sample_rate_hz[sensor])]
+        block = replace(stage.process(readings), time_ns=shown)
+    else:
+        block = stage.process(readings, time_ns)
+    stamps = even_stamps(readings, sample_rate_hz) if time_ns is None else time_ns
+    return _told(block, readings, stamps, believed) if verdict else block
 
 
 def _told(

@@ -14,20 +14,25 @@ from pydantic import Field
 from testbed.fusion.belief import check_belief
 from testbed.fusion.gate import Gate
 from testbed.fusion.kernels.covariance import HEADER_ROWS, RATE, STD
-from testbed.fusion.schedule import Schedule
+from testbed.fusion.kernels.merging import show_steps
+from testbed.fusion.schedule import Schedule, odd_sensor
+from testbed.fusion.stamps import Stamps, Timing
 from testbed.fusion.start import StartKind
+from testbed.fusion.transitions import EVEN, Steps
 from testbed.parts import Part
 from testbed.units import Rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from testbed.fusion.analysis.finding import Finding
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
+# Steps between stamps that are taken at a time.
+_PART = 4000
 # YAML gives the words.
 Switch = Annotated[bool, Field(json_schema_extra={"type": ["boolean", "string"], "enum": [True, False, "on", "off"]})]
 
@@ -60,7 +65,10 @@ class EstimateBlock:
         are those of (11), before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
         R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
         of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
-        guard_hits counts how often a bound held R or Q so far.
+        guard_hits counts how often a bound held R or Q so far. Of readings with stamps, what belongs to one of another
+        sensor stands at the next stamp of the fastest one, and late_<sensor> counts those that came too late so far.
+    time_ns : ndarray of int, shape (n_time,), optional
+        Stamps of the fastest sensor [ns], of readings that have some; those that came too late are left out.
     findings : tuple of Finding, optional
         What stands against the readings, where `estimate` looked (`testbed.fusion.analysis.verdict`).
     """
@@ -68,7 +76,24 @@ class EstimateBlock:
     rate: FloatArray
     std: FloatArray
     diagnostics: dict[str, FloatArray]
+    time_ns: NDArray[np.int64] | None = None
     findings: tuple[Finding, ...] = ()
+
+
+class Received(NamedTuple):
+    """The readings of a block as a filter sees them.
+
+    Parameters
+    ----------
+    Z, gated : ndarray, shape (n_sensor, n_step)
+        Readings [rad/s], read-only: NaN where none is due, infinite where one is missing; counts of those struck out.
+    timing : Timing, optional
+        When they came, of readings that do not come at regular steps.
+    """
+
+    Z: FloatArray
+    gated: FloatArray
+    timing: Timing | None = None
 
 
 class Rows(NamedTuple):
@@ -119,14 +144,14 @@ class BlockFilter:
     belief : mapping of str to SensorBelief
         What is believed about each sensor.
     sample_rate_hz : mapping of str to float
-        Rate of each sensor [Hz]; the fastest is an integer multiple of every other.
+        Rate of each sensor [Hz]; unless the method says `any_clock`, the fastest is an integer multiple of every other.
     parameters : Part
         The method's `Parameters`.
 
     Raises
     ------
     ValueError
-        If a sensor has no belief, or a rate does not divide the fastest one.
+        If a sensor has no belief, or a rate does not divide the fastest one and the method needs it to.
     """
 
     Parameters: ClassVar[type[Part]]
@@ -134,6 +159,8 @@ class BlockFilter:
     # What a method promises; the contract tests hold every method to what it says here (docs/filters.md).
     needs_both: ClassVar[bool] = False
     """It divides the band between two sensors, and refuses one alone or three."""
+    any_clock: ClassVar[bool] = False
+    """It steps from stamp to stamp: rates in any ratio, jitter, late and missing readings."""
     caution: ClassVar[str] = ""
     """Where it does not hold; printed beside its results."""
     start_leaves: ClassVar[tuple[float, float] | None] = None
@@ -152,7 +179,16 @@ class BlockFilter:
         if self.needs_both and len(sample_rate_hz) != 2:
             msg = f"belief: expected two sensors to divide the band between, got {list(sample_rate_hz)}"
             raise ValueError(msg)
-        self.schedule = Schedule(sample_rate_hz)
+        if not self.any_clock and (odd := odd_sensor(sample_rate_hz)):
+            fastest, value = max(sample_rate_hz.values()), sample_rate_hz[odd]
+            msg = (
+                f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {odd!r} for "
+                f"{type(self).__name__}, got {value:g} Hz; `kalman` takes any"
+            )
+            raise ValueError(msg)
+        self.schedule = Schedule(sample_rate_hz, any_ratio=True)
+        self._stamps: Stamps | None = None if self.schedule.even else Stamps(sample_rate_hz)
+        self._pending: FloatArray | None = None
         self._bias = np.array([[belief[name].bias] for name in self.schedule.sensors])
         self._gate = Gate(belief, self.schedule) if getattr(parameters, "gate", True) else None
 
@@ -164,7 +200,7 @@ class BlockFilter:
         return twin
 
     @abstractmethod
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
         """Filter a block of any length, from the state that the last one left.
 
         Parameters
@@ -173,64 +209,118 @@ class BlockFilter:
             Readings at the fastest rate [rad/s], read-only: NaN where none is due, infinite where one is missing.
         out : ndarray, shape (n_row, n_time)
             To be filled: rate, std [rad/s], then `rows`; NaN where undefined, as it comes.
+        steps : Steps, optional
+            How each step is reached; a method that does not say `any_clock` is not given it and need not take it.
         """
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
+    def check_clocks(self) -> None:
+        """Raise ValueError if the filter, as it is set, takes no readings with stamps or of odd rates."""
+        if not self.any_clock:
+            msg = (
+                f"time_ns: {type(self).__name__} takes readings at regular steps only, no stamps; "
+                "resample them, or take `kalman`"
+            )
+            raise ValueError(msg)
+
+    def process(
+        self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None = None
+    ) -> EstimateBlock:
         """Filter the next block.
 
         Parameters
         ----------
         readings : mapping of str to array_like, shape (n_sensor_samples,)
-            Readings that are due in the block [rad/s]; not finite means predict only.
+            Readings of every sensor in the block [rad/s], those that are due if there are no stamps; not finite means
+            predict only.
+        time_ns : mapping of str to array_like of int, shape (n_sensor_samples,), optional
+            Their stamps [ns], from any epoch that all sensors share; in every block or in none. They need not be
+            regular. A reading older than the last one of the block before is dropped and counted (`late_<sensor>`), so
+            blocks are best cut at an instant: those of all sensors before it here, the others next.
 
         Returns
         -------
         EstimateBlock
-            At the fastest rate, shape (n_time,).
+            At the fastest rate, or at the stamps of the fastest sensor, shape (n_time,).
 
         Raises
         ------
         ValueError
-            If a sensor is missing, unknown or has not as many readings as are due.
+            If a sensor is missing, unknown or has not as many readings as are due, or the method takes no stamps.
         """
-        return self.estimated(*self.received(readings))
+        return self.estimated(*self.received(readings, time_ns))
 
-    def received(self, readings: Mapping[str, ArrayLike]) -> tuple[FloatArray, FloatArray]:
+    def received(self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None = None) -> Received:
         """Return the readings of the next block as the filter sees them, and how many were struck out so far.
 
         Parameters
         ----------
-        readings : mapping of str to array_like, shape (n_sensor_samples,)
+        readings, time_ns : mapping of str to array_like, shape (n_sensor_samples,)
             As for `process`.
-
-        Returns
-        -------
-        Z, gated : ndarray, shape (n_sensor, n_time)
-            Readings at the fastest rate [rad/s], NaN where none is due, infinite where one is missing; counts.
         """
-        Z = self.schedule.spread(readings)
+        Z, timing = self._spread(readings, time_ns)
         gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
         # Only now: range and repetitions are those of the readings as they come.
         if self._bias.any():
             Z -= self._bias
         Z.flags.writeable = False
-        return Z, gated
+        return Received(Z, gated, timing)
 
-    def estimated(self, Z: FloatArray, gated: FloatArray) -> EstimateBlock:
+    def _spread(
+        self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None
+    ) -> tuple[FloatArray, Timing | None]:
+        if time_ns is None and self._stamps is None:
+            return self.schedule.spread(readings), None
+        self.check_clocks()
+        if self._stamps is None and not self.schedule.begun:
+            self._stamps = Stamps(dict(zip(self.schedule.sensors, self.schedule.rates_hz, strict=True)))
+        if self._stamps is None or (time_ns is None and self.schedule.even):
+            msg = "time_ns: expected stamps in every block or in none"
+            raise ValueError(msg)
+        return self._stamps.spread(readings, self._stamps.implied(readings) if time_ns is None else time_ns)
+
+    def estimated(self, Z: FloatArray, gated: FloatArray, timing: Timing | None = None) -> EstimateBlock:
         """Return the estimate over a block that was `received`; arguments as it returns them."""
-        out = self._rows_of(Z.shape[1])
-        self._advance(Z, out)
-        return self._shown(out, gated)
+        if timing is None:
+            out = self._rows_of(Z.shape[1])
+            self._advance(Z, out)
+            return self._shown(out, gated)
+        if self._pending is None:
+            self._pending = np.full(len(self._rows_of(0)), np.nan)
+        n_time = timing.time_ns.size
+        kept, begin = np.empty((self._pending.size, n_time)), 0
+        # In parts that stay in the processor's cache, all in one place.
+        room = np.empty(self._pending.size * min(_PART, Z.shape[1]))
+        for first in range(0, Z.shape[1], _PART):
+            part = slice(first, first + _PART)
+            shown = timing.shown[part]
+            out = room[: self._pending.size * shown.size].reshape(self._pending.size, shown.size)
+            out.fill(np.nan)
+            node, share, whole = timing.steps
+            self._advance(_read_only(Z[:, part]), out, Steps(node[part], share[part], whole[part]))
+            show_steps(out, shown, HEADER_ROWS, self._pending, kept, begin)
+            begin += int(np.count_nonzero(shown))
+        return self._timed(self._shown(kept, gated[:, timing.shown]), timing.late, timing.time_ns)
 
-    def blank(self, n_time: int) -> EstimateBlock:
+    def _timed(self, block: EstimateBlock, late: NDArray[np.int64], time_ns: NDArray[np.int64]) -> EstimateBlock:
+        counts = zip(self.schedule.sensors, late, strict=True)
+        late_rows = {f"late_{name}": np.full(time_ns.size, float(count)) for name, count in counts}
+        return EstimateBlock(block.rate, block.std, block.diagnostics | late_rows, time_ns)
+
+    def blank(self, n_time: int, *, timed: bool = False) -> EstimateBlock:
         """Return a block in which everything is undefined: what the filter gives, without the work.
 
         Parameters
         ----------
         n_time : int
             Its length, at the fastest rate.
+        timed : bool, optional
+            Whether it is one of readings with stamps.
         """
-        return self._shown(self._rows_of(n_time), np.zeros((len(self.schedule.sensors), n_time)))
+        sensors = self.schedule.sensors
+        block = self._shown(self._rows_of(n_time), np.zeros((len(sensors), n_time)))
+        if not timed:
+            return block
+        return self._timed(block, np.zeros(len(sensors), np.int64), np.zeros(n_time, np.int64))
 
     @property
     def step_seconds(self) -> float:
@@ -246,3 +336,9 @@ class BlockFilter:
         shown = {name: row for name, row in rows if name is not None}
         shown |= {f"gated_{name}": count for name, count in zip(sensors, gated, strict=True)}
         return EstimateBlock(out[RATE], out[STD], shown)
+
+
+def _read_only(values: FloatArray) -> FloatArray:
+    kept = np.ascontiguousarray(values)
+    kept.flags.writeable = False
+    return kept

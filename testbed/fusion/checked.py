@@ -12,7 +12,7 @@ from testbed.fusion.base import EstimateBlock
 from testbed.inputs.plugins import PluginError, running
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -43,51 +43,78 @@ class CheckedFilter:
         self._block, self._sample = 0, 0
         self._diagnostics: tuple[str, ...] | None = None
 
-    def process(self, readings: Mapping[str, ArrayLike]) -> EstimateBlock:
+    def process(
+        self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None = None
+    ) -> EstimateBlock:
         """Return the estimate of the next block.
 
         Parameters
         ----------
         readings : mapping of str to array_like, shape (n_sensor_samples,)
             Readings that fall due [rad/s]; the filter gets views that it cannot change.
+        time_ns : mapping of str to array_like of int, shape (n_sensor_samples,), optional
+            Their stamps [ns] (`BlockFilter.process`).
 
         Raises
         ------
         RunError
             If it raises anything or gives what is no estimate: filter, block and fault.
+        ValueError
+            If there are stamps and it takes none.
         """
         self._block += 1
-        views = {name: _read_only(values) for name, values in readings.items()}
-        n_time = max(values.size for values in views.values())
-        estimate = self._inner.process(views) if self._shipped else self._foreign(views)
+        views = [{name: _read_only(values) for name, values in readings.items()}]
+        n_time = max(values.size for values in views[0].values())
+        if time_ns is not None:
+            self.check_clocks()
+            views.append({name: _read_only(values) for name, values in time_ns.items()})
+        estimate = self._inner.process(*views) if self._shipped else self._foreign(views)
+        if not (time_ns is None and self._even()):
+            n_time = -1 if estimate.time_ns is None else estimate.time_ns.size
         self._check_shapes(estimate, n_time)
         checked = estimate if self._shipped else self._checked(estimate)
         self._sample += n_time
         return checked
 
-    def tried(self, readings: Mapping[str, FloatArray]) -> EstimateBlock:
+    def check_clocks(self) -> None:
+        """Raise ValueError if the filter takes no readings with stamps or of odd rates."""
+        check = getattr(self._inner, "check_clocks", None)
+        if check is None:
+            msg = f"time_ns: filter {self._name} takes readings at regular steps only, no stamps"
+            raise ValueError(msg)
+        check()
+
+    def tried(
+        self, readings: Mapping[str, FloatArray], time_ns: Mapping[str, ArrayLike] | None = None
+    ) -> EstimateBlock:
         """Return the estimate of the next block of a trial: of a shipped filter, whose kernels would take seconds to
         compile and whose faults show when it is built, only what it gives, undefined.
 
         Parameters
         ----------
-        readings : mapping of str to ndarray, shape (n_sensor_samples,)
+        readings, time_ns : mapping of str to ndarray, shape (n_sensor_samples,)
             As for `process`, which a plug-in gets them by.
         """
         if not self._shipped:
-            return self.process(readings)
-        blank: EstimateBlock = self._inner.blank(max(values.size for values in readings.values()))
+            return self.process(readings, time_ns)
+        timed = not (time_ns is None and self._even())
+        blank: EstimateBlock = self._inner.blank(max(values.size for values in readings.values()), timed=timed)
         return blank
+
+    def _even(self) -> bool:
+        """Return whether readings without stamps come at regular steps, one estimate for each of the fastest sensor."""
+        schedule = getattr(self._inner, "schedule", None)
+        return bool(getattr(schedule, "even", True))
 
     @property
     def untried_seconds(self) -> float:
         """About how long a step takes of which `tried` does nothing [s]."""
         return float(self._inner.step_seconds) if self._shipped else 0.0
 
-    def _foreign(self, readings: Mapping[str, FloatArray]) -> EstimateBlock:
+    def _foreign(self, given: Sequence[Mapping[str, FloatArray]]) -> EstimateBlock:
         try:
             with running("raised"):
-                estimate = self._inner.process(readings)
+                estimate = self._inner.process(*given)
         except PluginError as error:
             self._refuse(str(error), error)
         if not isinstance(estimate, EstimateBlock):

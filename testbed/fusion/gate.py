@@ -90,7 +90,7 @@ class Gate:
     """
 
     def __init__(self, belief: Mapping[str, SensorBelief], schedule: Schedule) -> None:
-        rates = [schedule.sample_rate_hz / stride for stride in schedule.strides]
+        rates = schedule.rates_hz
         self._setting = np.array(
             [_setting(belief[name], rate) for name, rate in zip(schedule.sensors, rates, strict=True)]
         )

@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 
 from testbed.fusion.belief import check_belief
 from testbed.fusion.coloured import slow_noise
-from testbed.fusion.schedule import MOST_STEPS, common_clock, long_cycle
+from testbed.fusion.schedule import MOST_STEPS, common_clock, long_cycle, nearest_clock
 from testbed.fusion.start import (
     REST_STD,
     StartKind,
@@ -54,7 +54,9 @@ class FusionModel:
     sample_rate_hz : float
         The fastest rate [Hz].
     strides : tuple of int
-        Sensor i has a reading at every strides[i]-th step.
+        Sensor i has a reading at every strides[i]-th step; the nearest whole number where its clock has another ratio.
+    A, Qc : ndarray, shape (n_state, n_state)
+        Dynamics [1/s] and density of the white noise [rad^2/s^3] in continuous time.
     F, Q, P0 : ndarray, shape (n_state, n_state)
         Transition [-], covariance of a step and of the start [rad^2/s^2].
     H : ndarray, shape (n_sensor, n_state)
@@ -72,6 +74,8 @@ class FusionModel:
     sensors: tuple[str, ...]
     sample_rate_hz: float
     strides: tuple[int, ...]
+    A: FloatArray
+    Qc: FloatArray
     F: FloatArray
     Q: FloatArray
     H: FloatArray
@@ -109,6 +113,7 @@ def build_model(
     use_input_noise: bool = True,
     coloured: bool = False,
     start: StartKind = "unknown",
+    any_ratio: bool = False,
 ) -> FusionModel:
     """Assemble and discretise the model of the sensors that have a sample rate.
 
@@ -128,6 +133,8 @@ def build_model(
         Give the slow noise of the sensors states of its own.
     start : {"unknown", "rest"}, optional
         What P0 knows (`testbed.fusion.start`).
+    any_ratio : bool, optional
+        Take rates that do not divide the fastest one, for who steps from stamp to stamp.
 
     Returns
     -------
@@ -137,7 +144,7 @@ def build_model(
     Raises
     ------
     ValueError
-        If a sensor has no belief, or a rate is not positive or does not divide the fastest one.
+        If a sensor has no belief, or a rate is not positive or, unless `any_ratio`, does not divide the fastest one.
 
     References
     ----------
@@ -145,7 +152,7 @@ def build_model(
     """
     sensors = tuple(sample_rate_hz)
     check_belief(belief, sensors)
-    fastest, strides = common_clock(sample_rate_hz)
+    fastest, strides = (nearest_clock if any_ratio else common_clock)(sample_rate_hz)
     believed = [belief[name] for name in sensors]
     A, Qc, H = continuous_model(believed, order=order, q=q, use_input_noise=use_input_noise)
     owners = np.concatenate([np.full(order, -1), *(np.full(one.n_state, i) for i, one in enumerate(believed))])
@@ -155,7 +162,7 @@ def build_model(
     F, Q = van_loan(A, Qc, 1.0 / fastest)
     R = np.array([one.reading_noise**2 * sample_rate_hz[name] for name, one in zip(sensors, believed, strict=True)])
     P0, still = _start(believed, A, Qc, order, slow_variance, start)
-    return FusionModel(sensors, fastest, strides, F, Q, H, R, P0, still, slow_variance.size, owners)
+    return FusionModel(sensors, fastest, strides, A, Qc, F, Q, H, R, P0, still, slow_variance.size, owners)
 
 
 def _with_slow_noise(

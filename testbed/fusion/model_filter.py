@@ -10,6 +10,7 @@ from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer,
 from testbed.fusion.base import BlockFilter, CommonParameters, Switch
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
+from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, Quantity
 
 if TYPE_CHECKING:
@@ -117,6 +118,8 @@ def initial_state(model: FusionModel, parameters: CommonParameters) -> FloatArra
 class ModelFilter(BlockFilter):
     """A filter that runs on the augmented model of `testbed.fusion.model`, in the form and precision of its parameters.
 
+    Between stamps its transitions are those of `testbed.fusion.transitions`.
+
     Parameters
     ----------
     belief : mapping of str to SensorBelief
@@ -129,9 +132,10 @@ class ModelFilter(BlockFilter):
     Raises
     ------
     ValueError
-        If a sensor has no belief, a rate does not divide the fastest one, or a parameter names an unknown sensor.
+        If a sensor has no belief, or a parameter names an unknown sensor.
     """
 
+    any_clock = True
     start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
@@ -148,17 +152,34 @@ class ModelFilter(BlockFilter):
             use_input_noise=parameters.use_input_noise,
             coloured=parameters.coloured,
             start=parameters.start,
+            any_ratio=True,
         )
+        self._nodes: tuple[FloatArray, ...] | None = None
         self._form = FORMS[form]
         kind = np.float32 if precision == "single" else np.float64
         self._x = initial_state(self.model, parameters).astype(kind)
         self._F, self._H = self.model.F.astype(kind), self.model.H.astype(kind)
         self._P, self._Q = self.carried(self.model.P0), self.carried(self.model.Q)
+        self._even = even(self._F, self._Q)
 
     def carried(self, covariance: FloatArray) -> FloatArray:
         """Return what the recursion carries for a covariance, in its precision: a copy, or its root."""
         value = covariance_root(covariance) if self._form == SQUARE_ROOT else covariance
         return value.astype(self._x.dtype)
+
+    def _tables(self) -> tuple[FloatArray, ...]:
+        """Return the tables that the kernel steps between stamps with: F and what it carries for Q, at each node."""
+        model = self.model
+        F, Q = transition_nodes(model.A, model.Qc, 1.0 / model.sample_rate_hz)
+        return F.astype(self._F.dtype), np.array([self.carried(one) for one in Q])
+
+    def _clocked(self, steps: Steps) -> tuple[Any, ...]:
+        """Return `steps` and the tables as the kernel takes them."""
+        if steps is EVEN:
+            return self._even
+        if self._nodes is None:
+            self._nodes = self._tables()
+        return (*steps, *self._nodes)
 
     @property
     def step_seconds(self) -> float:

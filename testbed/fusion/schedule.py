@@ -20,6 +20,55 @@ LARGEST_RATE = 1e6
 MOST_STEPS = 500
 
 
+def nearest_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
+    """Return the fastest rate [Hz] and the whole number nearest to the stride of each sensor on that clock.
+
+    Parameters
+    ----------
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz], in any ratio.
+
+    Raises
+    ------
+    ValueError
+        If a rate is not positive.
+    """
+    for name, value in sample_rate_hz.items():
+        if not (math.isfinite(value) and value > 0.0):
+            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
+            raise ValueError(msg)
+    fastest = float(max(sample_rate_hz.values()))
+    return fastest, tuple(round(fastest / value) for value in sample_rate_hz.values())
+
+
+def odd_sensor(sample_rate_hz: Mapping[str, float], within: float = 1e-9) -> str:
+    """Return the first sensor whose rate does not divide the fastest one, "" if all do.
+
+    Parameters
+    ----------
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+    within : float, optional
+        By how much of itself the ratio may be off; a nanosecond of drift per second of record is below any logger's
+        clock.
+    """
+    fastest, strides = nearest_clock(sample_rate_hz)
+    pairs = zip(sample_rate_hz.items(), strides, strict=True)
+    return next((name for (name, value), n in pairs if not math.isclose(n * value, fastest, rel_tol=within)), "")
+
+
+def even_rates(sample_rate_hz: Mapping[str, float]) -> dict[str, float]:
+    """Return the rates that divide the fastest one and are nearest to these [Hz].
+
+    Parameters
+    ----------
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz], in any ratio.
+    """
+    fastest, strides = nearest_clock(sample_rate_hz)
+    return {name: fastest / stride for name, stride in zip(sample_rate_hz, strides, strict=True)}
+
+
 def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int, ...]]:
     """Return the fastest rate [Hz] and the stride of each sensor on that clock.
 
@@ -33,17 +82,11 @@ def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int,
     ValueError
         If a rate is not positive or does not divide the fastest one.
     """
-    for name, value in sample_rate_hz.items():
-        if not (math.isfinite(value) and value > 0.0):
-            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
-            raise ValueError(msg)
-    fastest = float(max(sample_rate_hz.values()))
-    strides = tuple(round(fastest / value) for value in sample_rate_hz.values())
-    for (name, value), stride in zip(sample_rate_hz.items(), strides, strict=True):
-        # A nanosecond of drift per second of record is below any logger's clock.
-        if not math.isclose(stride * value, fastest, rel_tol=1e-9):
-            msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
-            raise ValueError(msg)
+    fastest, strides = nearest_clock(sample_rate_hz)
+    if name := odd_sensor(sample_rate_hz):
+        value = sample_rate_hz[name]
+        msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
+        raise ValueError(msg)
     return fastest, strides
 
 
@@ -66,17 +109,27 @@ class Schedule:
     ----------
     sample_rate_hz : mapping of str to float
         Rate of each sensor [Hz]; the fastest is an integer multiple of every other. All start at t = 0.
+    any_ratio : bool, optional
+        Take rates that do not divide the fastest one too: `strides` are the nearest whole numbers then, and nothing can
+        be spread.
 
     Raises
     ------
     ValueError
-        If a rate is not positive or does not divide the fastest one.
+        If a rate is not positive or, unless `any_ratio`, does not divide the fastest one.
     """
 
-    def __init__(self, sample_rate_hz: Mapping[str, float]) -> None:
+    def __init__(self, sample_rate_hz: Mapping[str, float], *, any_ratio: bool = False) -> None:
         self.sensors = tuple(sample_rate_hz)
-        self.sample_rate_hz, self.strides = common_clock(sample_rate_hz)
+        self.sample_rate_hz, self.strides = (nearest_clock if any_ratio else common_clock)(sample_rate_hz)
+        self.even = not odd_sensor(sample_rate_hz)
+        self.rates_hz = tuple(even_rates(sample_rate_hz).values()) if self.even else tuple(sample_rate_hz.values())
         self._sample = 0
+
+    @property
+    def begun(self) -> bool:
+        """Whether a reading was spread."""
+        return self._sample > 0
 
     def spread(self, readings: Mapping[str, ArrayLike]) -> FloatArray:
         """Return the readings of the next block as rows at the fastest rate, NaN where none is due, infinite where one

@@ -10,11 +10,12 @@ import numpy as np
 
 from testbed.judging.bounds import Bounds
 from testbed.judging.budget import budget_summary
+from testbed.judging.responses import response_curves
 from testbed.judging.table_facts import TableMetrics
 from testbed.metrics.errors import floor_density
 from testbed.metrics.line_fit import Waves
 from testbed.runs.block import first_due
-from testbed.runs.metrics import Budget, FloorDensity, TurntableMetrics
+from testbed.runs.metrics import Budget, FloorDensity, Responses, TurntableMetrics
 from testbed.scenario.departures import departures
 
 if TYPE_CHECKING:
@@ -96,13 +97,14 @@ class CaseFacts:
 
     @cached_property
     def pages(self) -> dict[str, Any]:
-        """Floor density, budget, departures and plug-ins as the metrics have them."""
+        """Floor density, budget, responses, departures and plug-ins as the metrics have them."""
         bandwidth = self.scenario.frame.bandwidth
         # A band that no sensor sees (the nulls of a mean over an interval) has no floor either.
         psds = self._bounds.densities if self.floors["floor_rmse_deg_s"] is not None else {}
         return {
             "floor_density": FloorDensity.model_validate(_floor_curve(psds, bandwidth)) if psds else None,
             "budget": Budget.model_validate(budget_summary(psds, bandwidth)) if psds else None,
+            "responses": Responses.model_validate(response_curves(self.scenario)) if self.scenario.sensors else None,
             "setup": departures(self.scenario),
             "plugins": [asdict(plugin) for plugin in self.scenario.plugins],
         }

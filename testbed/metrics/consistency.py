@@ -32,13 +32,19 @@ class Whiteness:
     .. math:: \mathrm{NIS} = \langle \nu^2 \rangle, \qquad
         \rho_l = \sum \nu_k \nu_{k-l} / \sum \nu_k^2, \; l = 1 \ldots 10
 
-    Only sums and the last ten values are kept, so memory does not grow.
+    Only sums and the last values are kept, so memory does not grow.
+
+    Parameters
+    ----------
+    lags : int, optional
+        How many; ten unless told otherwise.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lags: int = LAGS) -> None:
         self.n = 0
-        self._products = np.zeros(LAGS + 1)
-        self._last = np.zeros(LAGS)
+        self._lags = lags
+        self._products = np.zeros(lags + 1)
+        self._last = np.zeros(lags)
 
     def add(self, innovation: FloatArray, variance: FloatArray) -> None:
         """Add the innovations of a block.
@@ -53,7 +59,7 @@ class Whiteness:
         # Zeros stand for what was before the first one: they add nothing to any product.
         series = np.concatenate([self._last, fresh])
         self.n += fresh.size
-        self._products += [series[LAGS - lag : series.size - lag] @ fresh for lag in range(LAGS + 1)]
+        self._products += [series[self._lags - lag : series.size - lag] @ fresh for lag in range(self._lags + 1)]
         # A copy: a view would keep the whole block.
         self._last = series[fresh.size :].copy()
 
@@ -68,18 +74,20 @@ class Whiteness:
         low, high = chdtri(self.n, [1.0 - MISS / 2.0, MISS / 2.0]) / self.n
         return float(low), float(high)
 
+    def correlations(self) -> FloatArray:
+        """Return the correlation at lags 1, 2, ... [-], shape (n_lag,); none if undefined."""
+        return self._products[1:] / self._products[0] if self._products[0] > 0.0 else np.empty(0)
+
     def correlation(self) -> float | None:
-        """Return the correlation of largest size over lags 1 to 10 [-]; None if undefined."""
-        if not self._products[0] > 0.0:
-            return None
-        rho = self._products[1:] / self._products[0]
-        return finite(rho[np.argmax(np.abs(rho))])
+        """Return the correlation of largest size over the lags [-]; None if undefined."""
+        rho = self.correlations()
+        return finite(rho[np.argmax(np.abs(rho))]) if rho.size else None
 
     def correlation_bound(self) -> float:
         """Return what it stays below by chance if they are white [-]: 1/sqrt(n) per lag, and the miss shared by the
         lags.
         """
-        return float(-ndtri(MISS / (2.0 * LAGS)) / math.sqrt(self.n))
+        return float(-ndtri(MISS / (2.0 * self._lags)) / math.sqrt(self.n))
 
 
 class Consistency:

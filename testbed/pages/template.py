@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -35,9 +36,16 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.globals["vendored"] = _vendored
     environment.filters |= {"significant": significant, "bounded": bounded, "fixed": fixed, "plain": plain}
     # Globals, so that the macros of a template see them too.
     environment.globals |= {**values, "figure_number": {name: number for number, name in enumerate(figures, 1)}}
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
     drawn = {name: Markup(svg_text(figure, name)) for name, figure in figures.items()}
     return environment.get_template(template).render(figures=drawn)
+
+
+def _vendored(name: str) -> Markup:
+    """Return a script or style that stands beside the templates, as it is."""
+    # Markup: a file of this package.
+    return Markup((resources.files("testbed.pages") / "templates" / name).read_text(encoding="utf-8"))

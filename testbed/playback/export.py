@@ -96,11 +96,15 @@ def _writer(format: str) -> Callable[..., dict[str, dict[str, str]]]:
 
 
 def _write_map(path: Path, run: RunRecord, tracks: list[Track], places: Mapping[str, dict[str, str]]) -> None:
-    """Write the map; the sample rate stands in it in all its digits, for stamps are rounded to nanoseconds."""
-    channels: dict[str, Any] = {
-        track.name: {**places[track.name], "unit": "rad/s", "time": {"rate": f"{track.sample_rate_hz!r} Hz"}}
-        for track in tracks
-    }
+    """Write the map; the sample rate of an even clock stands in it in all its digits, for stamps are rounded to
+    nanoseconds.
+    """
+    channels: dict[str, Any] = {}
+    for track in tracks:
+        place = dict(places[track.name])
+        stamps = {"column": place.pop("stamps"), "unit": "s" if place["file"].endswith(".mf4") else "ns"}
+        time = stamps if track.signals.stamped else {"rate": f"{track.sample_rate_hz!r} Hz"}
+        channels[track.name] = {**place, "unit": "rad/s", "time": time}
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
     yaml.sort_base_mapping_type_on_output = False

@@ -12,9 +12,12 @@ from scipy.interpolate import make_interp_spline
 
 from testbed.errors import Problem, ScenarioError
 from testbed.logs.clock import NANO
+from testbed.runs.block import first_due
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from testbed.playback.reel import Reel
     from testbed.signals import FloatArray
@@ -24,13 +27,14 @@ FEWEST = 4
 _SAME = 1e-9
 # Instants that are one [ns].
 _SAME_NS = 0.5
+_BEFORE = 1.5
 # Beyond this many steps of the reference from its nearest known samples there is no reference.
 _REACH = 1.5
 
 
 @dataclass(frozen=True)
 class Lineup:
-    """The sensors of a recording on one time base, which begins where all have one instant in common.
+    """The sensors of a recording on one time base, which begins when all have begun.
 
     Parameters
     ----------
@@ -38,19 +42,23 @@ class Lineup:
         Sample rate [Hz] of ``base``, that of the fastest sensor, and of every sensor.
     readings : mapping of str to ndarray, shape (n_sensor_samples,)
         Rates [rad/s], NaN where one is lost.
-    reference : ndarray, shape (n_time,), optional
-        What is taken for the truth [rad/s], NaN where it is not known.
+    references : mapping of str to ndarray, shape (n_time,), optional
+        What is taken for the truth [rad/s] at the instants of ``base`` and of every sensor, NaN where it is not known.
     start_ns : int
         Where the time base begins, on the recording's own clock [ns].
     dropped : mapping of str to int
         Samples outside of it.
+    stamps_ns : mapping of str to ndarray, shape (n_time,), optional
+        Stamps [ns] after `start_ns` of ``base`` and of every sensor; None where the clocks are in whole ratios, and k /
+        rate says all.
     """
 
     rates: Mapping[str, float]
     readings: Mapping[str, FloatArray]
-    reference: FloatArray | None
+    references: Mapping[str, FloatArray] | None
     start_ns: int
     dropped: Mapping[str, int]
+    stamps_ns: Mapping[str, NDArray[np.int64]] | None = None
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -60,25 +68,55 @@ class Lineup:
     @property
     def n_time(self) -> int:
         """Number of samples of the base clock."""
+        if self.stamps_ns is not None:
+            return int(self.stamps_ns["base"].size)
         return max(values.size for values in self.readings.values())
-
-    def times(self) -> dict[str, FloatArray]:
-        """Return the stamps of ``base`` and of every sensor, shape (n_time,) [s]."""
-        found = {name: np.arange(values.size) / self.rates[name] for name, values in self.readings.items()}
-        return {"base": np.arange(self.n_time) / self.rates["base"], **found}
-
-    def stamps(self) -> dict[str, FloatArray] | None:
-        """Return the same where the clocks have no whole ratios; None on the integer path, where k / rate says all."""
-        return None
 
     @property
     def duration(self) -> float:
         """Length of the time base [s]."""
+        if self.stamps_ns is not None:
+            return NANO * float(self.stamps_ns["base"][-1]) + 1.0 / self.rates["base"]
         return self.n_time / self.rates["base"]
+
+    def times(self) -> dict[str, FloatArray]:
+        """Return the stamps of ``base`` and of every sensor, shape (n_time,) [s]."""
+        if self.stamps_ns is not None:
+            return {name: (NANO * stamps).astype(np.float64) for name, stamps in self.stamps_ns.items()}
+        found = {name: np.arange(values.size) / self.rates[name] for name, values in self.readings.items()}
+        return {"base": np.arange(self.n_time) / self.rates["base"], **found}
+
+    def first(self, name: str, start: int) -> int:
+        """Return the index of the first reading of a sensor at or after a sample of the base clock.
+
+        Parameters
+        ----------
+        name : str
+            The sensor.
+        start : int
+            The sample; one past the last gives all that is left.
+        """
+        if self.stamps_ns is None:
+            return first_due(start, self.rates["base"], self.rates[name])
+        base, own = self.stamps_ns["base"], self.stamps_ns[name]
+        return int(own.size if start >= base.size else np.searchsorted(own, base[start]))
+
+    def clock_words(self) -> str:
+        """Return how the clocks go together, for people."""
+        base = self.rates["base"]
+        others = [name for name in self.sensors if self.rates[name] != base]
+        if self.stamps_ns is None:
+            every = [f"{name} every {round(base / self.rates[name])}" for name in others]
+            return ", ".join([f"{base:.9g} Hz", *every])
+        stamped = [f"{name} at its own stamps, {self.rates[name]:.7g} Hz" for name in others]
+        return ", ".join([f"the stamps of the fastest sensor, {base:.7g} Hz", *stamped])
 
 
 def line_up(reels: Sequence[Reel], reference: Reel | None, file: str) -> Lineup:
     """Return the sensors of a recording on the clock of the fastest.
+
+    Even clocks in whole ratios with an instant in common, but for the rounding of their stamps, begin at that instant
+    and need no stamps; all others keep them.
 
     Parameters
     ----------
@@ -92,14 +130,14 @@ def line_up(reels: Sequence[Reel], reference: Reel | None, file: str) -> Lineup:
     Raises
     ------
     ScenarioError
-        If the sensors have no time in common, or clocks that are no whole multiples.
+        If the sensors have no time in common.
     """
     fastest = max(reels, key=lambda reel: reel.sample_rate_hz)
     _check_overlap(reels, fastest, file)
     strides = {reel.name: _stride(reel, fastest) for reel in reels}
     first = _first_common(reels, fastest, strides)
     if first is None:
-        raise ScenarioError([Problem(_no_ratio(reels, fastest), file=file)])
+        return _by_stamps(reels, fastest, reference)
     base = fastest.from_place(first)
     n_time = base.rate.size
     readings, dropped = {}, {}
@@ -110,13 +148,35 @@ def line_up(reels: Sequence[Reel], reference: Reel | None, file: str) -> Lineup:
         readings[reel.name] = _fitted(reel.rate[skipped:], -(-n_time // stride))
         dropped[reel.name] = reel.doubled + skipped + max(reel.rate.size - skipped - readings[reel.name].size, 0)
     rates = {reel.name: _rate(reel, base, strides[reel.name] or 1) for reel in reels}
-    return Lineup(
-        {"base": base.sample_rate_hz, **rates},
-        readings,
-        None if reference is None else at_instants(reference, base, n_time),
-        base.start_ns,
-        dropped,
-    )
+    references = None
+    if reference is not None:
+        known = at_instants(reference, base, n_time)
+        references = {"base": known, **{name: known[:: strides[name]] for name in readings}}
+    return Lineup({"base": base.sample_rate_hz, **rates}, readings, references, base.start_ns, dropped)
+
+
+def _by_stamps(reels: Sequence[Reel], fastest: Reel, reference: Reel | None) -> Lineup:
+    """Return the sensors at their own stamps, from where all have begun to the last of the fastest.
+
+    A sensor has begun a step and a half before its first reading: of what was cut so nothing is cut another time.
+    """
+    all_stamps = {reel.name: reel.stamps() for reel in reels}
+    begun = max(all_stamps[reel.name][0] - _BEFORE / (NANO * reel.sample_rate_hz) for reel in reels)
+    clock = all_stamps[fastest.name]
+    start, end = int(clock[np.searchsorted(clock, begun)]), int(clock[-1])
+    readings, stamps_ns, dropped, references = {}, {}, {}, {}
+    for reel in reels:
+        stamps = all_stamps[reel.name]
+        kept = slice(int(np.searchsorted(stamps, start)), int(np.searchsorted(stamps, end, side="right")))
+        readings[reel.name], stamps_ns[reel.name] = reel.rate[kept], stamps[kept] - start
+        dropped[reel.name] = reel.doubled + stamps.size - stamps_ns[reel.name].size
+        if reference is not None:
+            references[reel.name] = _interpolated(reference, (stamps[kept] - reference.start_ns).astype(np.float64))
+    stamps_ns = {"base": stamps_ns[fastest.name], **stamps_ns}
+    if reference is not None:
+        references["base"] = references[fastest.name]
+    rates = {"base": fastest.sample_rate_hz, **{reel.name: reel.sample_rate_hz for reel in reels}}
+    return Lineup(rates, readings, references or None, start, dropped, stamps_ns)
 
 
 def _stride(reel: Reel, fastest: Reel) -> int | None:
@@ -167,16 +227,6 @@ def _check_overlap(reels: Sequence[Reel], fastest: Reel, file: str) -> None:
         spans = ", ".join(f"{name} {NANO * a:.9g} to {NANO * b:.9g} s" for name, (a, b) in ends.items())
         message = f"expected sensors that were recorded at the same time, got {spans}: a map's time.offset moves one"
         raise ScenarioError([Problem(message, file=file)])
-
-
-def _no_ratio(reels: Sequence[Reel], fastest: Reel) -> str:
-    rates = ", ".join(
-        f"{reel.name} {reel.sample_rate_hz:.9g} Hz{'' if reel.stamps_ns is None else ' (uneven)'}" for reel in reels
-    )
-    return (
-        f"expected clocks that are even, in whole ratios to the fastest ({fastest.name}) and with an instant in "
-        f"common, got {rates}"
-    )
 
 
 def at_instants(reference: Reel, base: Reel, n_time: int) -> FloatArray:

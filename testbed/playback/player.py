@@ -8,7 +8,7 @@ from testbed.errors import Problem, RunError, ScenarioError
 from testbed.fusion import FILTERS
 from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError
-from testbed.runs.block import PlayedBlock, first_due
+from testbed.runs.block import PlayedBlock
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
@@ -41,13 +41,16 @@ def start_filters(specs: Mapping[str, FilterSpec], lineup: Lineup) -> dict[str, 
     for name, spec in specs.items():
         try:
             inner = spec.start(rates)
+            checked = CheckedFilter(name, inner, lineup.rates["base"], shipped=spec.type in FILTERS)
+            if lineup.stamps_ns is not None:
+                checked.check_clocks()
         except PluginError as error:
             msg = f"filter {name}: {error}"
             raise RunError(msg) from error
         except ValueError as error:
             problems.append(Problem(str(error), name))
         else:
-            started[name] = CheckedFilter(name, inner, lineup.rates["base"], shipped=spec.type in FILTERS)
+            started[name] = checked
     if problems:
         raise ScenarioError(problems)
     return started
@@ -65,19 +68,16 @@ def play_through(lineup: Lineup, filters: Mapping[str, CheckedFilter], length: i
     length : int, optional
         Samples of the base clock in a block.
     """
-    base = lineup.rates["base"]
     for start in range(0, lineup.n_time, length):
         stop = min(start + length, lineup.n_time)
-        spans = {
-            name: (first_due(start, base, lineup.rates[name]), first_due(stop, base, lineup.rates[name]))
-            for name in lineup.sensors
-        }
-        readings: dict[str, FloatArray] = {name: lineup.readings[name][slice(*span)] for name, span in spans.items()}
+        spans = {name: slice(lineup.first(name, start), lineup.first(name, stop)) for name in lineup.sensors}
+        readings: dict[str, FloatArray] = {name: lineup.readings[name][span] for name, span in spans.items()}
+        stamps = lineup.stamps_ns and {name: lineup.stamps_ns[name][span] for name, span in spans.items()}
         yield PlayedBlock(
             start,
             stop - start,
-            {name: first for name, (first, _) in spans.items()},
-            None if lineup.reference is None else lineup.reference[start:stop],
+            {name: span.start for name, span in spans.items()},
+            None if lineup.references is None else lineup.references["base"][start:stop],
             readings,
-            {name: stage.process(readings) for name, stage in filters.items()},
+            {name: stage.process(readings, stamps) for name, stage in filters.items()},
         )

@@ -145,17 +145,26 @@ def _stamped(channel: LogChannel, stamps: NDArray[np.int64], clock: TimeBase) ->
         raise refusal(channel.table.path, message)
     rate = np.full(n_grid, np.nan)
     rate[index] = values
-    exact = exact_rate(stamps, index, float(clock.quantum_ns))
+    exact, rounded = _even_rate(stamps, index, float(clock.quantum_ns))
     return Reel(
         channel.name,
         rate,
         int(stamps[0]),
         exact or clock.rate_hz,
-        float(clock.quantum_ns),
+        rounded,
         None if exact is not None else filled(stamps, index),
         doubled,
         channel.notes,
     )
+
+
+def _even_rate(stamps: NDArray[np.int64], index: NDArray[np.int64], quantum_ns: float) -> tuple[float | None, float]:
+    """Return the rate that explains stamps, None if there is none, and what they are rounded to [ns].
+
+    Steps of an exact clock, too, are multiples of a power of ten: what they seem rounded to counts only if it has to.
+    """
+    exact = exact_rate(stamps, index, 0.0)
+    return (exact, 1.0) if exact is not None else (exact_rate(stamps, index, quantum_ns), quantum_ns)
 
 
 def _sorted(stamps: NDArray[np.int64], values: FloatArray) -> tuple[NDArray[np.int64], FloatArray, int]:

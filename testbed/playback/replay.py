@@ -18,6 +18,7 @@ from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
 from testbed.logs.reader import is_map
 from testbed.notebook import Run, open_run
+from testbed.playback.cross import sensor_agreement
 from testbed.playback.description import description
 from testbed.playback.filters import filter_specs
 from testbed.playback.judge import ReplayJudge
@@ -27,7 +28,6 @@ from testbed.playback.player import play_through, start_filters
 from testbed.playback.reel import Reel, wind
 from testbed.playback.sinks import replay_sinks
 from testbed.playback.source import ReplaySource, open_source
-from testbed.runs.block import first_due
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.metrics import ReplayMetrics, RunMetrics
 from testbed.runs.outputs import chosen
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from testbed.chain.sinks import Sink
     from testbed.fusion.analysis.finding import Verdict
-    from testbed.logs.channel import Log
+    from testbed.logs.channel import Log, LogChannel
     from testbed.logs.logmap import LogMap
     from testbed.runs.block import PlayedBlock
     from testbed.scenario.model import FilterSpec
@@ -208,7 +208,7 @@ def prepare(
         message = f"expected less than the {lineup.duration:g} s of the recording, got {chosen_settle:g} s"
         raise ScenarioError([Problem(message, "--settle")])
     _check_lines(lines, lineup)
-    facts = _facts(source, reels, lineup)
+    facts = _facts(source, reels, reference, lineup)
     return Playback(source, lineup, specs, facts, chosen_settle, found, tuple(sorted(lines)), loaded.used)
 
 
@@ -233,7 +233,7 @@ def play_back(
 ) -> Run:
     """Play what `prepare` made ready; arguments as `replay`."""
     if out is None:
-        memory = MemoryStore(made.rates, made.lineup.stamps())
+        memory = MemoryStore(made.rates, None if made.lineup.stamps_ns is None else made.lineup.times())
         metrics = _played(made, [memory], block, progress)
         return Run.of(memory.groups(), metrics)
     wanted = chosen(outputs)
@@ -266,7 +266,7 @@ def play_back(
 
 def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tick: Progress | None) -> RunMetrics:
     lineup = made.lineup
-    known = lineup.reference is not None
+    known = lineup.references is not None
     judge = ReplayJudge(lineup.times(), made.settle, lineup.duration, made.specs, made.lines, reference=known)
     for part in play_through(lineup, start_filters(made.specs, lineup), block):
         judge.write(part, _reference(part, lineup))
@@ -284,6 +284,7 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
             "replay": made.facts,
             "findings": [finding_entry(one) for one in made.verdict.findings],
             "undecided": list(made.verdict.undecided),
+            "cross": sensor_agreement(lineup, next(iter(made.specs.values())).belief, made.settle),
             "versions": versions(),
         }
     )
@@ -291,14 +292,11 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
 
 def _reference(part: PlayedBlock, lineup: Lineup) -> dict[str, FloatArray]:
     """Return the reference of a block at the instants of ``base`` and of every sensor."""
-    if part.reference is None:
+    if lineup.references is None:
         return {}
-    base = lineup.rates["base"]
-    found = {"base": part.reference}
-    for name in lineup.sensors:
-        ratio = round(base / lineup.rates[name])
-        found[name] = part.reference[first_due(part.start, base, lineup.rates[name]) * ratio - part.start :: ratio]
-    return found
+    spans = {name: (first, part.sensors[name].size) for name, first in part.first.items()}
+    spans["base"] = part.start, part.n_time
+    return {name: lineup.references[name][first : first + n] for name, (first, n) in spans.items()}
 
 
 def _check_lines(lines: Sequence[float], lineup: Lineup) -> None:
@@ -307,35 +305,46 @@ def _check_lines(lines: Sequence[float], lineup: Lineup) -> None:
     if wrong:
         message = f"expected frequencies between 0 and {half:g} Hz, got {wrong[0]:g} Hz"
         raise ScenarioError([Problem(message, "--lines")])
-    if lines and lineup.reference is None:
+    if lines and lineup.references is None:
         message = "gain and phase need a reference: name the channel that is the truth 'reference' in the map"
         raise ScenarioError([Problem(message, "--lines")])
 
 
-def _facts(source: ReplaySource, reels: Sequence[Reel], lineup: Lineup) -> ReplayMetrics:
-    channels: dict[str, Any] = {}
-    for reel in reels:
-        channel = source.sensors[reel.name]
-        channels[reel.name] = {
-            "column": channel.label.strip("'"),
-            "file": str(channel.table.path),
-            "unit": channel.unit or None,
+def _channel(channel: LogChannel, reel: Reel, lineup: Lineup) -> dict[str, Any]:
+    return {
+        "column": channel.label.strip("'"),
+        "file": str(channel.table.path),
+        "unit": channel.unit or None,
+        "rate_hz": reel.sample_rate_hz,
+        "start_s": NANO * (reel.start_ns - lineup.start_ns),
+        "n_time": int(reel.rate.size),
+        "missing": reel.missing,
+        "dropped": reel.doubled,
+        "notes": [*channel.assumed, *channel.notes],
+    }
+
+
+def _facts(source: ReplaySource, reels: Sequence[Reel], reference: Reel | None, lineup: Lineup) -> ReplayMetrics:
+    channels = {
+        reel.name: {
+            **_channel(source.sensors[reel.name], reel, lineup),
             "rate_hz": lineup.rates[reel.name],
-            "start_s": NANO * (reel.start_ns - lineup.start_ns),
             "n_time": int(lineup.readings[reel.name].size),
             "missing": int(np.count_nonzero(np.isnan(lineup.readings[reel.name]))),
             "dropped": lineup.dropped[reel.name],
-            "notes": [*channel.assumed, *channel.notes],
         }
+        for reel in reels
+    }
+    known = None if reference is None or source.reference is None else _channel(source.reference, reference, lineup)
     formats = dict.fromkeys(channel.table.format for channel in source.sensors.values())
-    ratios = [f"{name} every {round(lineup.rates['base'] / lineup.rates[name])}" for name in lineup.sensors]
     return ReplayMetrics.model_validate(
         {
             "log": source.log,
             "format": "; ".join(formats),
-            "reference": lineup.reference is not None,
-            "clock": f"{lineup.rates['base']:.9g} Hz, {', '.join(ratios)}",
+            "reference": lineup.references is not None,
+            "clock": lineup.clock_words(),
             "channels": channels,
+            "reference_channel": known,
             "start_ns": lineup.start_ns,
             "notes": list(source.notes),
         }

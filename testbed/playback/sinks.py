@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from testbed.chain.versions import versions
 from testbed.runs.attributes import provenance
 from testbed.runs.folder import SIGNALS
@@ -52,7 +50,8 @@ def replay_sinks(
         What is wanted, of `testbed.runs.outputs.OUTPUTS`.
     """
     sinks: list[Sink] = []
-    rates, times = {**lineup.rates, **dict.fromkeys(filters, lineup.rates["base"])}, lineup.stamps()
+    rates = {**lineup.rates, **dict.fromkeys(filters, lineup.rates["base"])}
+    times = None if lineup.stamps_ns is None else lineup.times()
     if "netcdf" in outputs:
         netcdf = NetcdfStore(
             folder / SIGNALS, rates, lineup.n_time / rates["base"], provenance(name, None, versions()), times
@@ -73,7 +72,7 @@ def replay_sinks(
             model=None,
             settle=settle,
             detail=(settle, min(settle + max(_DETAIL, _FEWEST / rates["base"]), lineup.duration)),
-            times_ns=None if times is None else {one: np.rint(1e9 * t).astype(np.int64) for one, t in times.items()},
+            times_ns=lineup.stamps_ns,
         )
         sinks.append(stack.enter_context(recording))
     return sinks

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 from testbed.errors import RunError
 from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
-from testbed.recording.layout import blueprint
+from testbed.recording.layout import LOG, blueprint
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
@@ -70,6 +70,8 @@ class RecordingWriter:
         Base samples between poses and between profiles.
     times_ns : mapping of str to ndarray, shape (n_time,), optional
         Stamps [ns] of ``base`` and of every sensor, where they are no multiples of one step.
+    live : str, optional
+        Address of a viewer that shows it while it is written.
 
     Raises
     ------
@@ -91,8 +93,9 @@ class RecordingWriter:
         detail: tuple[float, float] | None = None,
         pose_stride: int = 400,
         times_ns: Mapping[str, NDArray[np.int64]] | None = None,
+        live: str | None = None,
     ) -> None:
-        self._path = Path(path)
+        self._path, self._live = Path(path), live
         self._model, self._pose_stride, self._times = model, pose_stride, times_ns
         self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
         self._fusion_names = list(fusion_names)
@@ -100,17 +103,22 @@ class RecordingWriter:
         self._colors = series_colors(list(sensor_rates), self._fusion_names)
         self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
         try:
-            self._stream.save(self._path)
+            if live is None:
+                self._stream.save(self._path)
+            else:
+                self._stream.set_sinks(rr.GrpcSink(live), rr.FileSink(self._path))
         except RuntimeError as error:
             raise self._failure(str(error)) from error
         self._stream.send_recording_name(scenario_name)
-        self._recording = Recording(self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)))
+        self._recording = Recording(
+            self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)), live=live is not None
+        )
         self._signals: dict[str, Signal] = {}
         bodies = {name: self._colors[f"sensors/{name}"] for name in sensor_rates}
         self._world = None if model is None else World(self._recording, model, bodies)
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
-        self._moved = False
+        self._moved = self._laid_out = False
         self._open = True
 
     def write(self, block: RunBlock | PlayedBlock) -> None:
@@ -120,6 +128,10 @@ class RecordingWriter:
             self._write_estimates(block, block.reference)
         else:
             self._write_run(block)
+        if self._live is not None and not self._laid_out:
+            # What there is to see is known now; somebody is looking.
+            self._stream.send_blueprint(self._blueprint(live=True))
+            self._laid_out = True
 
     def _write_run(self, block: RunBlock) -> None:
         truth = block.truth.rate
@@ -150,6 +162,8 @@ class RecordingWriter:
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
+                if series.startswith(("R_", "Q_", "N_")):
+                    self._add(f"/{key}/{LOG}{series}", _log10(values), stride, name, key, detailed=False, gaps=False)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -197,6 +211,9 @@ class RecordingWriter:
             try:
                 self._stream.flush(timeout_sec=LET_GO_TIMEOUT)
             except RuntimeError:
+                if self._live is not None and not self._is_full():
+                    # The window was closed; the file, which is read back next, goes on without it.
+                    return
                 if self._is_full() or time.monotonic() > deadline:
                     raise
             else:
@@ -274,7 +291,7 @@ class RecordingWriter:
                 self._channels[name] = Channel(self._recording, name, heights, self._colors[f"sensors/{name}"])
             self._channels[name].write(index, profiles)
 
-    def _blueprint(self) -> rr.blueprint.Blueprint:
+    def _blueprint(self, *, live: bool = False) -> rr.blueprint.Blueprint:
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
         hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
@@ -284,6 +301,7 @@ class RecordingWriter:
             channels=list(self._channels),
             model=self._model,
             clock=self._recording.clock,
+            live=live,
         )
 
     def _failure(self, reason: str) -> RunError:
@@ -294,3 +312,8 @@ class RecordingWriter:
         else:
             place = f"{'its disk is full: ' if free < FULL else ''}{free / 1e6:.1f} MB free"
         return RunError(f"{self._path}: the recording could not be written ({place}): {reason}")
+
+
+def _log10(values: FloatArray) -> FloatArray:
+    """Return the logarithm; NaN of what has none."""
+    return np.log10(values, where=values > 0.0, out=np.full(values.shape, np.nan))

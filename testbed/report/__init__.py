@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 from testbed.pages.palette import series_colors
 from testbed.pages.svg import FORMATS, figure_bytes
 from testbed.pages.template import render
+from testbed.report.bode import bode_figure, shows
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
-from testbed.report.digest import Digest, digest_run
+from testbed.report.closer import closer_views
+from testbed.report.digest import N_CLOSE, Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.pointing import inside_rows, sight_budget_figure, sight_curves_figure, sight_rows
+from testbed.report.within_figures import adapted_figure, whiteness_figure
 from testbed.report.words import METRICS, RATIOS, claims, finding_text, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
 from testbed.runs.metrics import read_text
@@ -116,6 +119,8 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         summary=summary(metrics, digest),
         scenario=scenario,
         digest=digest,
+        closer=closer_views(digest, _colors(metrics), (unit, scale)),
+        closer_bins=N_CLOSE,
         bands=band_rows(metrics.budget, digest) if metrics.budget else [],
         line_optima=line_optima(metrics),
         sight_rows=sight_rows(metrics),
@@ -147,8 +152,12 @@ def _line_sources(metrics: RunMetrics) -> dict[str, dict[float, Any]]:
     }
 
 
+def _colors(metrics: RunMetrics) -> dict[str, str]:
+    return series_colors(list(metrics.sensors), list(metrics.fusion))
+
+
 def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
-    colors, unit = series_colors(list(metrics.sensors), list(metrics.fusion)), error_unit(metrics)
+    colors, unit = _colors(metrics), error_unit(metrics)
     drawn = {}
     if metrics.pointing:
         drawn["sight_budget"] = sight_budget_figure(metrics.pointing)
@@ -158,6 +167,12 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
         drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:
         drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density, unit)
+    if shows(metrics, digest.transfers):
+        drawn["bode"] = bode_figure(metrics, digest.transfers, colors)
+    if digest.correlations:
+        drawn["whiteness"] = whiteness_figure(digest.correlations, colors)
+    if digest.adapted:
+        drawn["adapted"] = adapted_figure(digest.adapted, colors, digest.duration_s, unit)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors, unit)
     if metrics.budget is not None:

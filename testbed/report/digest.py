@@ -9,9 +9,13 @@ import numpy as np
 
 from testbed.errors import Problem, ScenarioError
 from testbed.metrics.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
+from testbed.metrics.transfer import TransferSums
 from testbed.pages.envelope import Envelope
+from testbed.report.within import adapted, correlations
 
 if TYPE_CHECKING:
+    from testbed.metrics.transfer import Transfer
+    from testbed.report.within import Correlations
     from testbed.runs.metrics import RunMetrics
     from testbed.runs.results import RunRecord
     from testbed.runs.signals import Signals
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 BLOCK = 2**18
 # More than a page has columns; few enough for a figure of some 100 kB.
 N_BINS = 700
+# What a reader may zoom into by a factor of four.
+N_CLOSE = 2800
 # A constant error leaks into the first two bins of a Hann window; from the third on the spectrum is free of it.
 FIRST_FREQ = 2
 # Lost readings in a row that a straight line may stand for.
@@ -30,20 +36,21 @@ FEWEST = 1000
 
 @dataclass(frozen=True)
 class RateTrace:
-    """A rate [rad/s] over the whole run and in the zoom."""
+    """A rate [rad/s] over the whole run, in the zoom, and over the whole run for who looks closer."""
 
     whole: Envelope
     zoom: Envelope
+    close: Envelope
 
 
 @dataclass(frozen=True)
 class ErrorTrace:
     """An error against the truth [rad/s].
 
-    `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error| <=
-    2 std; None for a sensor. `density` is the two-sided power density after settle [rad^2/s^2/Hz] at `freq_hz`, empty
-    if the record is too short; `band_rms` the error [rad/s] in each band of the noise budget, None where the spectrum
-    does not reach.
+    `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error|
+    <= 2 std; None for a sensor. `transfer` is what came out over the truth. `density` is the two-sided power
+    density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short; `band_rms` the error [rad/s]
+    in each band of the noise budget, None where the spectrum does not reach.
     """
 
     whole: Envelope
@@ -53,6 +60,8 @@ class ErrorTrace:
     density: FloatArray
     n_segments: int
     band_rms: tuple[float | None, ...] = ()
+    transfer: Transfer | None = None
+    close: Envelope | None = None
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,19 @@ class Digest:
     sensor_errors: dict[str, ErrorTrace]
     filter_errors: dict[str, ErrorTrace]
     thermal: dict[str, ThermalTrace] = field(default_factory=dict)
+    adapted: dict[str, dict[str, Envelope]] = field(default_factory=dict)
+    correlations: dict[str, dict[str, Correlations]] = field(default_factory=dict)
+
+    @property
+    def transfers(self) -> dict[str, Transfer]:
+        """By group, such as ``sensors/mhd_ars``, what came out over the truth."""
+        errors = {"sensors": self.sensor_errors, "fusion": self.filter_errors}
+        return {
+            f"{kind}/{name}": trace.transfer
+            for kind, traces in errors.items()
+            for name, trace in traces.items()
+            if trace.transfer is not None
+        }
 
     @property
     def has_truth(self) -> bool:
@@ -156,6 +178,8 @@ def digest_run(run: RunRecord) -> Digest:
         rates=rates,
         sensor_errors={name: errors[f"sensors/{name}"] for name in metrics.sensors},
         filter_errors={name: errors[f"fusion/{name}"] for name in metrics.fusion},
+        adapted=adapted(run),
+        correlations=correlations(run),
         thermal={name: _thermal(run, name) for name in metrics.sensors if "temperature" in run.sensors[name]},
     )
 
@@ -201,12 +225,14 @@ def _whole(signal: _Column) -> Envelope:
 def _rate_trace(signal: _Column, zoom: tuple[float, float]) -> RateTrace:
     fs = signal.sample_rate_hz
     start, stop = min(round(zoom[0] * fs), signal.n_time - 1), min(round(zoom[1] * fs) + 1, signal.n_time)
-    return RateTrace(Envelope(0, signal.n_time, fs, N_BINS), Envelope(start, stop, fs, N_BINS))
+    whole, close = (Envelope(0, signal.n_time, fs, n_bins) for n_bins in (N_BINS, N_CLOSE))
+    return RateTrace(whole, Envelope(start, stop, fs, N_BINS), close)
 
 
 def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
     trace.whole.process(first, rate)
     trace.zoom.process(first, rate)
+    trace.close.process(first, rate)
 
 
 def _follow(
@@ -220,20 +246,26 @@ def _follow(
     settle = min(int(np.ceil(run.metrics.settle_s * fs - 1e-6)), signal.n_time)
     n_segment = segment_length(signal.n_time - settle)
     welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
+    transfer = TransferSums(fs, signal.n_time - settle, [line for line in run.metrics.line_freq_hz if line > 0])
     trace = _rate_trace(signal, zoom)
     whole, band = Envelope(0, signal.n_time, fs, N_BINS), Envelope(0, signal.n_time, fs, N_BINS)
+    close = None if std is None else Envelope(0, signal.n_time, fs, N_CLOSE)
     n_inside, n_judged = 0, 0
     n_block = max(1, BLOCK // against.stride)
     for first in range(0, signal.n_time, n_block):
         stop = min(first + n_block, signal.n_time)
         rate = signal.read(first, stop)
-        error = against.error(first, rate)
+        true = against.truth(first, stop)
+        error = rate if true is None else rate - true
         settled = max(settle - first, 0)
         _add_rate(trace, first, rate)
         whole.process(first, error)
+        if true is not None:
+            transfer.process(true[settled:], rate[settled:])
         if welch is not None:
             welch.process(_bridged(error[settled:]) if std is None else error[settled:])
-        if std is not None:
+        if std is not None and close is not None:
+            close.process(first, error)
             sigma = std.read(first, stop)
             band.process(first, sigma)
             if truth is None:
@@ -249,6 +281,8 @@ def _follow(
         density=density,
         n_segments=0 if welch is None else welch.n_segments,
         band_rms=_band_rms(welch, run.metrics),
+        transfer=transfer.result(),
+        close=close,
     )
 
 
@@ -261,14 +295,13 @@ class _Against:
         self._truth, self._signal = truth, signal
         self.stride = 1 if truth is None or self._own else _stride(run, group, signal, truth)
 
-    def error(self, first: int, rate: FloatArray) -> FloatArray:
-        """Return what a block of the signal from sample `first` on is off by [rad/s]."""
+    def truth(self, first: int, stop: int) -> FloatArray | None:
+        """Return the truth [rad/s] at the signal's samples `first` <= k < `stop`; None where there is none."""
         if self._truth is None:
-            return rate
+            return None
         if not self._own:
-            stop = first + rate.size
-            return rate - self._truth.read(first * self.stride, (stop - 1) * self.stride + 1)[:: self.stride]
-        return rate - self._at(np.asarray(self._signal.signals.read("time", first, first + rate.size)))
+            return self._truth.read(first * self.stride, (stop - 1) * self.stride + 1)[:: self.stride]
+        return self._at(np.asarray(self._signal.signals.read("time", first, stop)))
 
     def _at(self, times: FloatArray) -> FloatArray:
         """Return the truth at other instants [s], by straight lines between its samples."""

@@ -67,7 +67,7 @@ def _stands(metrics: RunMetrics) -> list[str]:
         return []
     standing = [f"{one.kind} of {one.sensor}" for one in metrics.findings if not one.fixed]
     fixed = [f"{one.kind} of {one.sensor}" for one in metrics.findings if one.fixed]
-    words = [f"Against it stands: {', '.join(standing)}; no number below is worth more than that."] if standing else []
+    words = [f"Against it stands: {', '.join(standing)}; read every number below in that light."] if standing else []
     return [*words, *([f"Put right before the filters ran: {', '.join(fixed)}."] if fixed else [])]
 
 

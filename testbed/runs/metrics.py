@@ -161,6 +161,28 @@ class Budget(Entry):
             return np.asarray(information**-0.5)
 
 
+class Response(Entry):
+    """Gain [-] and phase [deg] at the first of the frequencies that stand beside it: up to half its sample rate."""
+
+    gain: list[float]
+    phase_deg: list[float]
+
+
+class BelievedResponses(Entry):
+    """What some filters were told of the sensors, where that is not what they are."""
+
+    filters: list[str]
+    sensors: dict[str, Response]
+
+
+class Responses(Entry):
+    """Responses of the sensors as they are built against frequency [Hz], and as filters believe them to be."""
+
+    frequency_hz: list[float]
+    sensors: dict[str, Response]
+    beliefs: list[BelievedResponses] = []
+
+
 class PointingBudget(Entry):
     """Who makes the residual: shares of its variance [-], which add up to 1; inside the knowledge by sensor and term.
     Rms of each part, of all, and of all with one of them halved [urad]; `quadrature_urad` is what it is not.
@@ -236,15 +258,38 @@ class ChannelMetrics(Entry):
 
 
 class ReplayMetrics(Entry):
-    """What was replayed: the recording, its channels, whether it has a reference, and how its clocks go together."""
+    """What was replayed: the recording, its channels, whether it has a reference and which, and how its clocks go
+    together.
+    """
 
     log: str
     format: str
     reference: bool
     clock: str
     channels: dict[str, ChannelMetrics]
+    reference_channel: ChannelMetrics | None = None
     start_ns: int | None = None
     notes: list[str] = []
+
+
+class CrossBandMetrics(Entry):
+    """What two sensors share between two frequencies [Hz]: coherence [-], and the second over the first, over what is
+    believed of that: gain [-] and phase [deg], None where they share too little.
+    """
+
+    low_hz: float
+    high_hz: float
+    coherence: float
+    gain_over_belief: float | None = None
+    phase_off_belief_deg: float | None = None
+
+
+class CrossMetrics(Entry):
+    """Two sensors of a recording against each other, by bands."""
+
+    first: str
+    second: str
+    bands: list[CrossBandMetrics] = []
 
 
 class FindingMetrics(Entry):
@@ -263,8 +308,8 @@ class FindingMetrics(Entry):
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
-    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it;
-    `scenario` is its name, and there is no `seed`.
+    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it, `cross`
+    what its sensors say of each other; `scenario` is its name, and there is no `seed`.
 
     Examples
     --------
@@ -285,11 +330,13 @@ class RunMetrics(Entry):
     bounds_reason: str | None = None
     floor_density: FloorDensity | None = None
     budget: Budget | None = None
+    responses: Responses | None = None
     pointing: dict[str, PointingMetrics] = {}
     expectations: list[Expectation] = []
     replay: ReplayMetrics | None = None
     findings: list[FindingMetrics] = []
     undecided: list[str] = []
+    cross: list[CrossMetrics] = []
     versions: dict[str, Any] = {}
     setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []

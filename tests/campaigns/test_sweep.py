@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -219,27 +217,22 @@ def test_a_scheduler_that_is_not_there_is_an_error_of_the_run(done, tmp_path, mo
         sweep(study, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
 
 
-@pytest.mark.slow
-def test_a_parent_that_is_killed_loses_nothing_that_was_finished(tmp_path):
-    """Killed at random moments until it comes to its end: each launch only adds, and the end is that of one launch."""
-    path = written(tmp_path, "vary: {motion.0.sine.frequency: {linear: [5 Hz, 40 Hz], points: 8}}\nseeds: 2\n")
-    command = [sys.executable, "-m", "testbed", "sweep", str(path), "--out", str(tmp_path / "out"), "--quiet"]
-    rng, before = np.random.default_rng(3), set()
-    for _ in range(4):
-        child = subprocess.Popen(command)
-        time.sleep(rng.uniform(2.0, 8.0))
-        child.send_signal(signal.SIGKILL)
-        child.wait()
-        if (tmp_path / "out" / CASES).is_dir() and any((tmp_path / "out" / CASES).glob("part-*")):
-            rows = read_cases(tmp_path / "out")
-            now = set(zip(rows["case"].to_pylist(), rows["seed"].to_pylist(), strict=True))
-            assert before <= now
-            before = now
-    assert subprocess.run(command, check=False).returncode == 0
-    rows = read_cases(tmp_path / "out")
-    assert rows.num_rows == 8 * 2 * 4
-    whole = sweep(load_study(path), out=tmp_path / "whole")
-    assert rows.drop_columns("launch").equals(read_cases(whole).drop_columns("launch"))
+def test_error_against_the_delay_of_a_sensor(tmp_path):
+    """A line of f comes late by 360 f T degrees; the estimate that believes otherwise is the worse for it."""
+    axes = "{sensors.mhd_ars.delay: {linear: [0 ms, 1 ms], points: 3}, motion.0.sine.frequency: [20 Hz]}"
+    path = written(tmp_path, f"vary: {axes}\nseeds: 1\n")
+    folder = sweep(load_study(path), out=tmp_path / "out")
+    rows = {(row["source"], row["sensors.mhd_ars.delay"]): row for row in open_sweep(folder).to_pylist()}
+    phases = [rows["mhd_ars", delay]["lines"][0]["phase_deg"] for delay in (0.0, 5e-4, 1e-3)]
+    # The ramp-in is still on: its share of a radian within the delay, and the noise of the sensor.
+    np.testing.assert_allclose(np.diff(phases), -360.0 * 20.0 * 5e-4, rtol=0, atol=0.2)
+    errors = [rows["kalman", delay]["rmse_deg_s"] for delay in (0.0, 5e-4, 1e-3)]
+    assert errors == sorted(errors)
+    assert errors[2] > 2.0 * errors[0]
+    page = (folder / "sweep.html").read_text("utf-8")
+    assert 'aria-label="Errors over the first axis"' in page
+    for case in range(3):
+        assert f"testbed sweep {path} --only {case}:7" in page
 
 
 def test_what_a_task_gives_can_be_sent(tmp_path):

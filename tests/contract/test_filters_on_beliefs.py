@@ -70,7 +70,7 @@ PAIRS = [
     pytest.param(
         name,
         one,
-        marks=BEGINS_LONG if name in ("complementary", "blending") and one == "exactly sx300 and hg9900" else (),
+        marks=BEGINS_LONG if (name, one) == ("blending", "exactly sx300 and hg9900") else (),
     )
     for name in NAMES
     if METHODS[name].needs_both

@@ -211,7 +211,7 @@ def test_a_leak_ends_with_1_and_is_named(cycles, tmp_path, monkeypatch, capsys):
         def __init__(self, record):
             self.rate = record.rate - smoothed(record.rate, record.sample_rate_hz, 1.0 / 2000.0)
 
-    monkeypatch.setattr("testbed.drift.session.paper3.compensate", Result)
+    monkeypatch.setattr("testbed.compensation.paper3.compensate", Result)
     status, text = ends_with(["audit", "paper3", cycles / "unseen", "--out", tmp_path / "audit"], monkeypatch, capsys)
     assert status == 1
     assert "LEAK: of a true rate with a period of 21600 s only" in text

@@ -122,3 +122,29 @@ def test_a_filter_just_switched_on_is_less_linear_than_a_settled_one() -> None:
     fresh, settled = (program.ratios(1, replace(short, warm_up=seconds)) for seconds in (0.0, 20.0))
     assert fresh.shape == (1,)
     assert fresh[0] > settled[0] > 0.0
+
+
+def test_shaped_blends_compare_or_say_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program = load("shaped_blends")
+    monkeypatch.setattr(sys, "argv", ["shaped_blends.py", str(tmp_path / "figure.png")])
+    monkeypatch.setattr(program.importlib.util, "find_spec", lambda _name: None)
+    program.main()
+    said = capsys.readouterr().out
+    assert "python -m pip install slycot" in said
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+    row = next(line for line in said.splitlines() if line.startswith("sx300 + adis16505_filtered"))
+    one, two = (float(value) for value in row.replace(" dB", "").split()[3:7:2])
+    assert two < 4.0
+    assert one > 12.0
+
+
+def test_synthesis_finds_nothing_much_nearer_to_the_bound() -> None:
+    pytest.importorskip("slycot")
+    program = load("shaped_blends")
+    default = program.pair("adis16505_filtered", "sx300")
+    L, norm = program.synthesised(default)
+    # The weights are fitted within 0.6 dB.
+    assert norm < default.excess(L).max() < 4.2
+    assert norm - 0.6 < default.excess(program.shaped(default)).max() < norm + 0.6

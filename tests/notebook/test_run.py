@@ -61,7 +61,7 @@ def test_a_name_in_the_table_is_text_and_no_markup(pair):
 
 def test_the_figures_are_those_of_the_report(run):
     figures = run.plot()
-    assert list(figures) == ["rates", "errors", "spectrum", "budget"]
+    assert list(figures) == ["rates", "errors", "spectrum", "bode", "whiteness", "adapted", "budget"]
     assert all(isinstance(figure, Figure) and figure.axes for figure in figures.values())
     assert [axes.get_title(loc="left")[:6] for axes in figures["errors"].axes] == ["kalman", "arw_sh"]
 
@@ -69,7 +69,7 @@ def test_the_figures_are_those_of_the_report(run):
 def test_a_notebook_shows_the_figures_and_two_cells_do_not_mix(pair):
     figures, others = pair[0].plot(), pair[1].plot()
     page, other = figures._repr_html_(), others._repr_html_()
-    assert page.count("<svg") == len(figures) == 4
+    assert page.count("<svg") == len(figures) == 7
     ids, more = (set(re.findall(r'\bid="([^"]+)"', text)) for text in (page, other))
     assert ids
     assert not ids & more

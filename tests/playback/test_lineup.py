@@ -49,17 +49,34 @@ def test_three_clocks_meet_where_the_chinese_remainder_says():
 
 
 @pytest.mark.parametrize(
-    ("other", "message"),
+    "other",
     [
-        (reel("slow", 300.0, 100), "in whole ratios"),
-        (reel("slow", 100.0, 100, start_s=0.0005), "with an instant in common"),
-        (reel("slow", 100.0, 100, stamps_ns=10_000_000 * np.arange(100)), r"slow 100 Hz \(uneven\)"),
-        (reel("slow", 100.0, 100, start_s=100.0), "recorded at the same time"),
+        reel("slow", 300.0, 200),
+        reel("slow", 100.0, 100, start_s=0.0005),
+        reel("slow", 100.0, 100, stamps_ns=10_000_000 * np.arange(100)),
     ],
 )
-def test_what_has_no_common_clock_is_refused_by_name(other, message):
-    with pytest.raises(ScenarioError, match=message):
-        line_up([reel("fast", 1000.0, 1000), other], None, "x")
+def test_other_clocks_keep_their_stamps(other):
+    """A rate of no whole ratio, a clock half a step beside the other's, and one that jitters."""
+    made = line_up([reel("fast", 1000.0, 1000), other], None, "x")
+    assert made.stamps_ns is not None
+    np.testing.assert_array_equal(made.stamps_ns["base"], made.stamps_ns["fast"])
+    since = other.stamps() - made.start_ns
+    inside = (since >= 0) & (since <= made.stamps_ns["base"][-1])
+    np.testing.assert_array_equal(made.stamps_ns["slow"], since[inside])
+    np.testing.assert_array_equal(made.readings["slow"], other.rate[inside])
+    assert made.dropped["slow"] == np.count_nonzero(~inside)
+    # Each reading in one block, whichever way it is cut.
+    cuts = [0, 17, 400, made.n_time]
+    firsts = [made.first("slow", cut) for cut in cuts]
+    assert (firsts[0], firsts[-1]) == (0, made.stamps_ns["slow"].size)
+    for cut, at in zip(cuts[1:-1], firsts[1:-1], strict=True):
+        assert made.stamps_ns["slow"][at - 1] < made.stamps_ns["base"][cut] <= made.stamps_ns["slow"][at]
+
+
+def test_what_was_not_recorded_at_the_same_time_is_refused():
+    with pytest.raises(ScenarioError, match="recorded at the same time"):
+        line_up([reel("fast", 1000.0, 1000), reel("slow", 100.0, 100, start_s=100.0)], None, "x")
 
 
 def test_a_reference_on_the_same_clock_is_taken_as_it_is():

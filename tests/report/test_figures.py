@@ -38,7 +38,7 @@ def make_digest(
     freq_hz = np.geomspace(1.0, 500.0, 60)
 
     def rate(values: np.ndarray) -> RateTrace:
-        return RateTrace(envelope_of(values), envelope_of(values, 1000, 1401))
+        return RateTrace(envelope_of(values), envelope_of(values, 1000, 1401), envelope_of(values))
 
     def error(values: np.ndarray, band: float | None) -> ErrorTrace:
         bands = None if band is None else envelope_of(np.full(n, band))

@@ -9,7 +9,7 @@ import typer
 
 from testbed.cli.options import Output, expanded
 from testbed.cli.status import MISSED
-from testbed.compensation import PAPER
+from testbed.compensation import LITERATURE
 from testbed.drift.columns import Columns
 
 app = typer.Typer(
@@ -69,7 +69,10 @@ def apply(
 @expanded
 def audit(
     model: Annotated[
-        str, typer.Argument(metavar="MODEL", help=f"Trained model (JSON), or {PAPER}: the paper's own protocol.")
+        str,
+        typer.Argument(
+            metavar="MODEL", help=f"Trained model (JSON), or {', '.join(LITERATURE)}: methods of paper 3's Table 2."
+        ),
     ],
     source: Source,
     output: Output,

@@ -104,6 +104,7 @@ class Imm(BlockFilter):
         count, n = self._X.shape
         return 1e-7 + 2e-9 * float(count * (2 + count) * n**2)
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    # Its chain steps regularly.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         model, chain = (self.model.F, self._Q, self.model.H, self.model.R), (self._stay, self._mu, self._started)
         self._started = imm_kernel(self._X, self._P, *model, *chain, Z, out)

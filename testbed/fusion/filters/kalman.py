@@ -10,6 +10,7 @@ from pydantic import Field
 from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model_filter import CovarianceParameters, ModelFilter, Variance
+from testbed.fusion.transitions import EVEN, Steps
 from testbed.units import DEG
 
 if TYPE_CHECKING:
@@ -71,6 +72,6 @@ class Kalman(ModelFilter):
         self._started = False
         self._run = kalman_kernel(self._x.size, self._R.size, self._form, self.model.n_slow)
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
-        progress = (self._outside, self._started)
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
+        progress = (self._clocked(steps), self._outside, self._started)
         self._started = self._run(self._x, self._P, self._F, self._Q, self._H, self._R, Z, *progress, out)

@@ -10,6 +10,7 @@ from pydantic import Field
 from testbed.fusion.base import Rows
 from testbed.fusion.kernels.covariance import SENSOR, adaptive_kernel
 from testbed.fusion.model_filter import CovarianceParameters, ModelFilter, Variance
+from testbed.fusion.transitions import EVEN, Steps
 from testbed.units import DEG
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ class AdaptiveFilter(ModelFilter):
         self._forget = 0.0
         self._run = adaptive_kernel(self._x.size, n_sensor, self._form, self.model.n_slow)
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
-        state = (self._sensors, self._windows, self._chosen, self._progress, self._forget)
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
+        state = (self._clocked(steps), self._sensors, self._windows, self._chosen, self._progress, self._forget)
         self._run(self._x, self._P, self._F, self._Q, self._H, Z, *state, out)
 
 
@@ -105,6 +106,13 @@ class SageHusa(AdaptiveFilter):
         self._chosen |= "Q" in parameters.adapt
         if self._chosen.any():
             self._Q = self.carried(np.diag(np.diag(self.model.Q)))
+
+    def check_clocks(self) -> None:
+        """Raise ValueError if Q adapts, which it does from one regular step to the next."""
+        super().check_clocks()
+        if self._chosen.any():
+            msg = f"adapt: {type(self).__name__} adapts Q at regular steps only; expected R or r between stamps"
+            raise ValueError(msg)
 
 
 class Shakf(SageHusa):

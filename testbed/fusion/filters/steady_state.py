@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from testbed.fusion.base import BlockFilter, CommonParameters, Rows, Switch
 from testbed.fusion.kernels.covariance import COUNTS, EVERY, PRESENT, settling_kernel
 from testbed.fusion.model import TIME_UNIT, build_model
 from testbed.fusion.model_filter import initial_state
+from testbed.fusion.schedule import even_rates
+from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, Frequency, Range
 
 if TYPE_CHECKING:
@@ -61,6 +63,9 @@ class SteadyState(BlockFilter):
     an hour. While a sensor is missing q is that of the same design for those that are left; while all are, the rate is
     believed to depart by no more than three amplitudes from its last value.
 
+    Where readings have stamps, or rates of another ratio, the cycle has no end: the gains stay those of the recursion,
+    its order and q those of the nearest whole ratios.
+
     Parameters
     ----------
     belief : mapping of str to SensorBelief
@@ -77,6 +82,7 @@ class SteadyState(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = SteadyStateParameters
+    any_clock = True
     rows = Rows(per_sensor=("innovation", "innovation_variance"))
     start_leaves = (0.0045 * DEG, 0.0045 * DEG)
     fault_leaves = (0.4 * DEG, 0.1 * DEG)
@@ -85,8 +91,9 @@ class SteadyState(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: SteadyStateParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        best = _design(belief, sample_rate_hz, parameters)
-        q, self._granted = _of_those_left(belief, sample_rate_hz, parameters, best)
+        even = sample_rate_hz if self.schedule.even else even_rates(sample_rate_hz)
+        best = _design(belief, even, parameters)
+        q, self._granted = _of_those_left(belief, even, parameters, best)
         *others, self.model = (
             build_model(
                 belief,
@@ -95,12 +102,15 @@ class SteadyState(BlockFilter):
                 q=one,
                 coloured=parameters.coloured,
                 start=parameters.start,
+                any_ratio=True,
             )
             for one in q
         )
         self._Q = np.array([one.Q for one in (*others, self.model)])
+        self._densities = np.array([one.Qc for one in (*others, self.model)])
+        self._nodes: tuple[FloatArray, FloatArray] | None = None
         n, n_sensor = len(self.model.F), len(self.model.H)
-        n_step = math.lcm(*self.model.strides)
+        n_step = math.lcm(*self.model.strides) if self.schedule.even else 1
         self._x, self._P = initial_state(self.model, parameters), self.model.P0.copy()
         self._cycle = (
             np.zeros((n_step, n, n_sensor)),
@@ -114,9 +124,20 @@ class SteadyState(BlockFilter):
         self._last = np.array([self._x[0], self._P[0, 0], (_DEPARTURE * parameters.amplitude) ** 2])
         self._run = settling_kernel(n, n_sensor, self.model.n_slow)
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
         model, memory = self.model, (self._cycle, self._progress, self._last, self._granted)
-        self._run(self._x, self._P, model.F, self._Q, model.H, model.R, Z, *memory, out)
+        self._run(self._x, self._P, model.F, self._Q, model.H, model.R, Z, self._clocked(steps), *memory, out)
+
+    def _clocked(self, steps: Steps) -> tuple[Any, ...]:
+        """Return `steps` and the tables as the kernel takes them; between stamps no gain is looked at again."""
+        if steps is EVEN:
+            return even(self.model.F, self._Q)
+        if self._nodes is None:
+            self._progress[EVERY] = np.iinfo(np.int64).max
+            step = 1.0 / self.model.sample_rate_hz
+            F, Q = zip(*(transition_nodes(self.model.A, one, step) for one in self._densities), strict=True)
+            self._nodes = F[0], np.array(Q)
+        return (*steps, *self._nodes)
 
 
 def _design(

@@ -67,6 +67,7 @@ class VbAkf(ModelFilter):
     """
 
     Parameters: ClassVar[type[Part]] = VbAkfParameters
+    any_clock = False
     rows = Rows(per_sensor=("innovation", "innovation_variance", "R"))
 
     def __init__(
@@ -82,6 +83,7 @@ class VbAkf(ModelFilter):
         """About how long a step takes, compiled, on a core of 2020 [s]."""
         return 1e-7 + (2 + self._iterations) * 3e-9 * self._x.size**2
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    # Its recursion steps regularly.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         model, noise = (self._F, self._Q, self._H), (self._alpha, self._beta, self._forget, self._iterations)
         self._started = vb_akf_kernel(self._x, self._P, *model, *noise, self._started, Z, out)

@@ -12,8 +12,10 @@ from pydantic import Field
 
 from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.bank import bank_kernel
-from testbed.fusion.model import build_model
+from testbed.fusion.kernels.covariance import JOSEPH, NODES
+from testbed.fusion.model import TIME_UNIT, build_model
 from testbed.fusion.model_filter import FormParameters, ModelFilter
+from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
@@ -97,7 +99,8 @@ class Wideband(ModelFilter):
         q = parameters.q * np.logspace(0.0, parameters.decades, parameters.filters)
         self._R = self.measurement_noise("R", {}, explicit=False)
         self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)
-        self._levels = np.log10(q)
+        self._even = even(self.model.F, self._Q, self.model.Q)
+        self._levels, self._parameters = np.log10(q), parameters
         self._x = np.repeat(self._x[:, None], q.size, axis=1)
         self._P = np.repeat(self._P[:, :, None], q.size, axis=2)
         self._score = np.zeros(q.size)
@@ -128,14 +131,35 @@ class Wideband(ModelFilter):
                 q=float(one),
                 use_input_noise=parameters.use_input_noise,
                 coloured=parameters.coloured,
+                any_ratio=True,
             )
             for one in q
         ]
         return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    def _tables(self) -> tuple[FloatArray, ...]:
+        """Return the tables of F, of Q for each filter of the bank, and of what is the same for all."""
+        model, parameters = self.model, self._parameters
+        unit = np.zeros_like(model.Qc)
+        last = parameters.order - 1
+        unit[last, last] = TIME_UNIT ** (2 * last)
+        step = 1.0 / model.sample_rate_hz
+        F, slow = transition_nodes(model.A, model.Qc - parameters.q * unit, step)
+        _, fast = transition_nodes(model.A, unit, step)
+        n = len(F[0]) - model.n_slow if self._form == JOSEPH else len(F[0])
+        Q = np.empty((len(F), n, n, self._levels.size))
+        for j, (own, of_signal) in enumerate(zip(slow, fast, strict=True)):
+            for m, q in enumerate(10.0**self._levels):
+                Q[j, :, :, m] = self.carried(own + q * of_signal)[:n, :n]
+        # To the bit what it has at regular steps.
+        Q[NODES] = self._Q[:n, :n]
+        shared = slow + parameters.q * fast
+        shared[NODES] = model.Q
+        return F, Q, shared
+
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
         model, (of_F, of_H) = self.model, self._columns
-        mixing = (self._score, self._watch, self._setting, self._levels)
+        mixing = (self._clocked(steps), self._score, self._watch, self._setting, self._levels)
         self._run(self._x, self._P, model.F, of_F, self._Q, model.Q, model.H, of_H, self._R, Z, *mixing, out)
 
 

@@ -19,6 +19,7 @@ from testbed.fusion.kernels.covariance import (
     INNOVATION,
     INNOVATION_VARIANCE,
     JOSEPH,
+    NODES,
     RATE,
     SQUARE_ROOT,
     STD,
@@ -404,21 +405,45 @@ def start_again(x, P, score, restart, n, M):  # pragma: no cover
                     P[j, k, m] = P[j, k, best]
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def between_bank(Q, table, j, s, n, M):  # pragma: no cover
+    """Set Q = (1 - s) table[j] + s table[j + 1] for M filters side by side, their first n rows and columns."""
+    for a in range(n):
+        for b in range(n):
+            for m in range(M):
+                Q[a, b, m] = table[j, a, b, m]
+            if s != 0.0:
+                for m in range(M):
+                    Q[a, b, m] += s * (table[j + 1, a, b, m] - table[j, a, b, m])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def between_one(M, table, j, s, n):  # pragma: no cover
+    """Do what `between` of the other file does."""
+    for a in range(n):
+        for b in range(n):
+            M[a, b] = table[j, a, b]
+            if s != 0.0:
+                M[a, b] += s * (table[j + 1, a, b] - table[j, a, b])
+
+
 @functools.lru_cache
 def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, nonzero, Q, shared, H, seen, R, Z, score, watch, setting, levels, out), a bank of M Kalman
-    filters over a block.
+    """Return run(x, P, F, nonzero, Q, shared, H, seen, R, Z, clocked, score, watch, setting, levels, out), a bank of M
+    Kalman filters over a block.
 
     They differ in Q (n, n, M) only and lie side by side: x (n, M), P (n, n, M); in SQUARE_ROOT form P and Q are roots.
     In JOSEPH form only the lower half of P is kept, and for the last `n_slow` states Q is `shared` (n, n).
     `nonzero` (n, n + 1) and `seen` (n_sensor, n + 1) list the columns of F and H that are not zero, their number last.
     `score` (M,) is the forgetting sum of log likelihoods, `watch` (n_sensor, 2) as in `admit`, `setting` = [started,
-    forget, gate, patience, restart], `levels` (M,) what the weights average into the row LEVEL.
+    forget, gate, patience, restart], `levels` (M,) what the weights average into the row LEVEL. `clocked` is as there,
+    with a table of `shared` behind that of Q (n_node, n, n, M), of which JOSEPH form takes the states before those of
+    slow noise only.
     """
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, nonzero, Q_in, shared, H_in, seen, R, Z, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, nonzero, Q_in, shared, H_in, seen, R, Z, clocked, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))
@@ -426,17 +451,30 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
         e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
         used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
+        common = np.empty((n, n))
+        common[:] = shared
+        node, share, whole, F_between, Q_between, shared_between = clocked
+        at, part, span = -1, 0.0, 1.0
         forget, gate, patience = setting[1], setting[2], setting[3]
         weigh(score, weight, M)
         for k in range(Z.shape[1]):
-            if setting[0] > 0.0:
+            parts = whole[k] + 1 if node.size > 0 else 1
+            for turn in range(parts if setting[0] > 0.0 else 0):
+                if node.size > 0:
+                    j, s = (NODES, 0.0) if turn < parts - 1 else (node[k], share[k])
+                    if at != j or part != s:
+                        between_one(F, F_between, j, s, n)
+                        between_bank(Q, Q_between, j, s, core if form == JOSEPH else n, M)
+                        between_one(common, shared_between, j, s, n)
+                        at, part = j, s
+                    span = (j + s) / NODES
                 some = find_lost(P, lost, n, M, form)
                 if some:
                     x_before[:], P_before[:] = x, P
                 if form == SQUARE_ROOT:
                     predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, n, M)
                 elif form == JOSEPH:
-                    predict_half(x, P, F, nonzero, Q, shared, work, moved, n, core, M)
+                    predict_half(x, P, F, nonzero, Q, common, work, moved, n, core, M)
                 else:
                     predict_bank(x, P, F, nonzero, Q, work, moved, n, M)
                 if some:
@@ -468,8 +506,9 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
                 out[row + REFUSED, k] = watch[i, 1]
             if informed:
                 setting[0] = 1.0
+                fade = forget if span == 1.0 else forget**span
                 for m in range(M):
-                    score[m] *= forget
+                    score[m] *= fade
                 for i in range(n_sensor):
                     if used[i]:
                         # What the gate looked at last is still so, unless a reading was used since.

@@ -13,6 +13,10 @@ S in place of P and Q, P = D D' and Q = S S'.
 
 Readings come as one row per sensor at the fastest rate: NaN where none is due, infinite where one is due but missing
 (it also breaks the chain of differences). Both mean: predict only. Until the first reading nothing is predicted either.
+
+Steps may be of any length: `clocked` = (node, share, whole, F, Q) says how step k is reached, by whole[k] regular steps
+and one that ends the share s behind a node of the tables F and Q (n_node, n, n), which have NODES of them to a regular
+step (`testbed.fusion.transitions`). Where `node` is empty every step is a regular one, and nobody looks at the tables.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -28,6 +32,8 @@ from numba import njit
 # Forms of the covariance.
 CONVENTIONAL, JOSEPH, SQUARE_ROOT = 0, 1, 2
 
+# Nodes of the tables of transitions to one regular step.
+NODES = 128
 # Rows of the output of `kalman_kernel`; then INNOVATION_ROWS per sensor.
 RATE, STD, HEADER_ROWS = 0, 1, 2
 INNOVATION, INNOVATION_VARIANCE, INNOVATION_ROWS = 0, 1, 2
@@ -79,6 +85,36 @@ SENSOR = np.dtype(
         ("window_count", np.int64),
     ]
 )
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def between(M, table, j, s, n, rows):  # pragma: no cover
+    """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal."""
+    if s == 0.0:
+        for a in range(rows):
+            for b in range(n):
+                M[a, b] = table[j, a, b]
+        for a in range(rows, n):
+            M[a, a] = table[j, a, a]
+        return
+    part = M.dtype.type(s)
+    for a in range(rows):
+        for b in range(n):
+            M[a, b] = table[j, a, b] + part * (table[j + 1, a, b] - table[j, a, b])
+    for a in range(rows, n):
+        M[a, a] = table[j, a, a] + part * (table[j + 1, a, a] - table[j, a, a])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def reach_step(F, Q, j, s, tables, at, n, rows):  # pragma: no cover
+    """Set F and Q to those of a step that ends the share s behind node j; `at` = (j, s) of what they hold.
+
+    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it.
+    """
+    if at[0] != j or at[1] != s:
+        between(F, tables[0], j, s, n, rows)
+        between(Q, tables[1], j, s, n, rows)
+        at[0], at[1] = j, s
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -453,9 +489,24 @@ def recall_root(x, D, G, K, R, due, n):  # pragma: no cover
     update_root(D, G, K, R, due, n, 1)
 
 
+@njit(cache=True, error_model="numpy")
+def coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, count):  # pragma: no cover
+    """Predict `count` steps, as the filters do without a reading: not inlined, so that they need not be a loop."""
+    most, zero = x.dtype.type(LOST_VARIANCE), x.dtype.type(0.0)
+    for _ in range(count):
+        if form == SQUARE_ROOT:
+            predict_root(x, P, F, Q, array, moved, n)
+            recall_root(x, P, G, gain, lost, due, n)
+        elif form == JOSEPH:
+            predict(x, P, F, Q, reach, work, moved, n, core)
+            recall(x, P, 0, most, zero, g, n)
+        else:
+            predict_plain(x, P, F, Q, work, moved, n)
+
+
 @functools.lru_cache
 def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, Q, H, R, Z, outside, started, out) -> started, the plain Kalman filter over a block.
+    """Return run(x, P, F, Q, H, R, Z, clocked, outside, started, out) -> started, the plain Kalman filter over a block.
 
     x (n,) and P (n, n) are replaced by the posterior of the last step; in SQUARE_ROOT form P and Q are roots. Z is
     (n_sensor, n_time); `outside` (n_sensor,) counts as in `outside_gate`; `out` (HEADER_ROWS + INNOVATION_ROWS *
@@ -464,7 +515,7 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, outside, started, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, clocked, outside, started, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
@@ -473,7 +524,9 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         H = np.empty((n_sensor, n), kind)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
-        lost = np.empty(1, kind)
+        lost, at = np.empty(1, kind), np.full(2, -1.0)
+        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
         spans(F, core, n, reach)
@@ -481,6 +534,11 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         spans(H, core, n, seen[:, 2:])
         for k in range(Z.shape[1]):
             if started:
+                if node.size > 0:
+                    if whole[k] > 0:
+                        reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                        coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[k])
+                    reach_step(F, Q, node[k], share[k], tables, at, n, rows)
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
                     recall_root(x, P, G, gain, lost, due, n)
@@ -544,10 +602,18 @@ def still_changing(K, before, share, n, n_sensor):  # pragma: no cover
     return changing
 
 
+@njit(cache=True, error_model="numpy")
+def coast_toward(x, P, F, Q, reach, work, moved, g, n, core, last, count):  # pragma: no cover
+    """Do what `coast` does, believing that the rate does not depart further from its last value than `last` says."""
+    for _ in range(count):
+        predict(x, P, F, Q, reach, work, moved, n, core)
+        recall(x, P, 0, last[1] + last[2], last[0], g, n)
+
+
 @functools.lru_cache
 def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, Q, H, R, Z, cycle, progress, last, granted, out), the Kalman filter until its gains have
-    settled, then with those.
+    """Return run(x, P, F, Q, H, R, Z, clocked, cycle, progress, last, granted, out), the Kalman filter until its gains
+    have settled, then with those.
 
     `cycle` = (K, C, settled, before): gains (n_step, n, n_sensor), variance of an innovation (n_step, n_sensor) and
     covariance after the readings (n_step, n, n) of each step of the cycle in which the readings repeat, and the gains
@@ -557,15 +623,18 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
     with the Q of the sensors that are there, Q (2^n_sensor, n, n), bit i for sensor i. `last` = [rate, its variance,
     variance of its departure], of the last reading: with no sensor at all the rate is not believed to go further.
     `granted` (2^n_sensor, order) is the variance of the rate's derivatives that is believed of a signal which those
-    sensors could follow. `out` as in `kalman_kernel`.
+    sensors could follow. `out` as in `kalman_kernel`. The table Q of `clocked` has one more axis in front, as Q; gains
+    never settle where steps are of any length (`progress[EVERY]` is to be out of reach).
     """
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q, H_in, R, Z, cycle, progress, last, granted, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, R, Z, clocked, cycle, progress, last, granted, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
-        P, F, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
+        P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        H, g, gain, at = np.empty((n_sensor, n)), np.empty(n), np.empty(n), np.full(3, -1.0)
+        node, share, before_it, F_between, Q_between = clocked
+        Q[:] = Q_in[progress[PRESENT]]
         K, C_settled, settled, before = cycle
         x[:], P[:], F[:], H[:] = x_in, P_in, F_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
@@ -575,7 +644,18 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
         now = np.zeros((n, n_sensor))
         for k in range(Z.shape[1]):
             step = progress[STEP]
+            there = progress[PRESENT]
             if progress[STARTED] > 0:
+                if node.size > 0:
+                    tables = (F_between, Q_between[there])
+                    at[0] = at[0] if at[2] == there else -1.0
+                    if before_it[k] > 0:
+                        reach_step(F, Q, NODES, 0.0, tables, at, n, core)
+                        coast_toward(x, P, F, Q, reach, work, moved, g, n, core, last, before_it[k])
+                    reach_step(F, Q, node[k], share[k], tables, at, n, core)
+                elif at[2] != there:
+                    Q[:] = Q_in[there]
+                at[2] = there
                 move(x, F, reach, moved, n, core)
             if progress[MODE] == SETTLED:
                 whole = True
@@ -590,7 +670,7 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             read = progress[MODE] == SETTLED
             if progress[MODE] != SETTLED:
                 if progress[STARTED] > 0:
-                    grow(P, F, Q[progress[PRESENT]], reach, work, n, core)
+                    grow(P, F, Q, reach, work, n, core)
                     recall(x, P, 0, last[1] + last[2], last[0], g, n)
                 for i in range(n_sensor):
                     e[i] = np.nan
@@ -782,17 +862,18 @@ def adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n):  # pragma: no cover
 
 @functools.lru_cache
 def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) -> Any:  # noqa: PLR0915
-    """Return run(x, P, F, Q, H, Z, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over a block.
+    """Return run(x, P, F, Q, H, Z, clocked, sensors, windows, chosen, progress, forget, out), the Sage-Husa family over
+    a block.
 
     As `kalman_kernel`, with R and its adaptation in `sensors` (n_sensor,) of dtype SENSOR, the squared innovations of
     the sliding windows in `windows` (n_sensor, n_window), the diagonal elements of Q that adapt in `chosen` (n,), and
-    `progress` = [started, beta^k, guard hits of Q]. What the adaptation remembers is in double precision whatever the
-    arrays are.
+    `progress` = [started, beta^k, guard hits of Q]. Q that
+    adapts takes regular steps only. What the adaptation remembers is in double precision whatever the arrays are.
     """
     core = n - n_slow
 
     @njit(cache=True, error_model="numpy")
-    def run(x_in, P_in, F_in, Q_in, H_in, Z, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+    def run(x_in, P_in, F_in, Q_in, H_in, Z, clocked, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
         kind = x_in.dtype
         x, x_prior, P_prior, P_post = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
         moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
@@ -801,7 +882,9 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
         square = np.empty(n_sensor)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
-        array, lost = np.empty((n, 2 * n), kind), np.empty(1, kind)
+        array, lost, at = np.empty((n, 2 * n), kind), np.empty(1, kind), np.full(2, -1.0)
+        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
         spans(F, core, n, reach)
@@ -811,6 +894,11 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         for k in range(Z.shape[1]):
             predicted = progress[0] > 0.0
             if predicted:
+                if node.size > 0:
+                    if whole[k] > 0:
+                        reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                        coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[k])
+                    reach_step(F, Q, node[k], share[k], tables, at, n, rows)
                 if form == SQUARE_ROOT:
                     predict_root(x, P, F, Q, array, moved, n)
                     recall_root(x, P, G, gain, lost, due, n)
@@ -879,7 +967,9 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
             out[STD, k] = np.sqrt(row_square(P, 0, n) if form == SQUARE_ROOT else P[0, 0])
             out[Q_RATE, k] = row_square(Q, 0, n) if form == SQUARE_ROOT else Q[0, 0]
             out[GUARD_HITS, k] = hits + progress[2]
-        x_in[:], P_in[:], Q_in[:] = x, P, Q
+        x_in[:], P_in[:] = x, P
+        if adapts_Q:
+            Q_in[:] = Q
 
     return run
 

@@ -12,10 +12,11 @@ from testbed.fusion.lanes.source import LANES, Pattern
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from testbed.fusion.base import Received as Block
     from testbed.fusion.model_filter import ModelFilter
     from testbed.signals import FloatArray
 
-    Received = Sequence[tuple[FloatArray, FloatArray]]
+    Received = Sequence[Block]
 
 
 def packs(members: Sequence[int]) -> list[list[int]]:

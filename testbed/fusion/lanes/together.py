@@ -57,7 +57,7 @@ class Together:
         received = [one.received(values) for one, values in zip(filters, readings, strict=True)]
         done: dict[int, EstimateBlock] = {}
         if self._lanes is not None:
-            whole = [m for m, (Z, _) in enumerate(received) if not np.isinf(Z).any()]
+            whole = [m for m, (Z, _, timing) in enumerate(received) if timing is None and not np.isinf(Z).any()]
             done = self._lanes.advance(filters, received, whole)
         return [done[m] if m in done else one.estimated(*received[m]) for m, one in enumerate(filters)]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
@@ -23,12 +22,14 @@ from testbed.fusion.two_paths.design import (
     input_psd,
     inverted,
     low_pass,
-    parallel,
+    over,
     without_far_zeros,
     zeros_at_dc,
 )
 from testbed.fusion.two_paths.kernel import MEMORY_ENTRIES, VARIANCE, two_paths
+from testbed.fusion.two_paths.loop import Loop, butterworth_loop
 from testbed.fusion.two_paths.noise import alone_variance, noise_variance, slow_variance
+from testbed.fusion.two_paths.paths import parallel
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from testbed.fusion.model import FusionModel
     from testbed.fusion.realisation import Realisation
     from testbed.parts import Part
-    from testbed.signals import FloatArray
+    from testbed.signals import ComplexArray, FloatArray
 
 # Modes of the slow path slower than this [rad/s] keep what they got wrong at the start, of a sine of this frequency;
 # its mean is taken over so many seconds.
@@ -64,16 +65,31 @@ class TwoPathParameters(CommonParameters):
     amplitude: Range = math.radians(1.0)
 
 
+class Lag(NamedTuple):
+    """How the slow path by itself errs for a sine of the amplitude that the filter is made for.
+
+    Parameters
+    ----------
+    freq_hz : float
+        The frequency named [Hz].
+    of : callable
+        Mean square of the error, Hz -> rad^2/s^2.
+    """
+
+    freq_hz: float
+    of: Callable[[FloatArray], FloatArray]
+
+
 class TwoPaths(BlockFilter):
     r"""A fast and a slow sensor through inverses of their own, and a loop between them.
 
-    .. math:: \hat\omega = B\, z_{fast} / G_{fast} + u, \quad \dot u = k e + c, \quad \dot c = k_i e, \quad
+    .. math:: \hat\omega = B\, z_{fast} / G_{fast} + u, \quad \dot u = k e + c, \quad \dot c = q e - z c, \quad
         e = B\, z_{slow} / G_{slow} - \hat\omega
 
-    Settled k is w_c (times :math:`\sqrt 2` with :math:`k_i = w_c^2` for order 2): the sum of a low-pass of the slow
-    path and the matching high-pass of the fast one. From an unknown start, and after each loss, k follows the scalar
-    Riccati equation, :math:`w' = w_c^2 - w^2`, which is w coth(w t): the slow path's mean at first, the loop later.
-    From a known rest it is w tanh(w t).
+    Settled it is the sum of a low-pass L of the slow path, which k, q and z say (`testbed.fusion.two_paths.loop`), w_c
+    for short, and the matching high-pass of the fast one. From an unknown start, and after each loss, k follows the
+    scalar Riccati equation, :math:`w' = w_c^2 - w^2`, which is w coth(w t): the slow path's mean at first, the loop
+    later. From a known rest it is w tanh(w t).
 
     The bandwidth is the one with the least error for the sine named, noise and lag A |1 - B| / sqrt(2). The claimed
     variance is that error, the noise part from the covariance of sensors and filter together (periodic, exact), slow
@@ -99,7 +115,7 @@ class TwoPaths(BlockFilter):
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
     needs_both = True
-    # Of the low-pass L at the crossover.
+    # Of the low-pass L at a crossover that is given.
     order: ClassVar[int]
     start_leaves = (math.radians(0.05), math.radians(0.1))
 
@@ -114,28 +130,39 @@ class TwoPaths(BlockFilter):
         self.rows = Rows(once=(f"innovation_{self.model.sensors[self._slow]}",))
         slow, fast = (belief[self.model.sensors[i]] for i in (self._slow, self._fast))
         slow_rate_hz = self.model.sample_rate_hz / self.model.strides[self._slow]
-        # The mean over an interval, as optical gyros read, has its first zero at the rate of the readings.
-        come = _as_they_come(slow, parameters.frequency, slow_rate_hz)
+        readings = slow
         slow = without_far_zeros(slow, math.pi * slow_rate_hz)
-        come /= complex(slow.realisation().response(np.array([parameters.frequency]))[0])
+
+        def come(freq_hz: FloatArray) -> ComplexArray:
+            return _as_they_come(readings, freq_hz, slow_rate_hz) / slow.realisation().response(freq_hz)
+
         fast = without_far_zeros(fast, 2.0 * math.pi * self.model.sample_rate_hz)
-        order = self.order
         if zeros_at_dc(fast) > 1:
             msg = f"belief: expected at most one zero at s = 0 for the fast sensor, got {zeros_at_dc(fast)}"
             raise ValueError(msg)
         power = parameters.amplitude**2 / 2.0
-        alone_band, alone = _best_alone(slow, slow_rate_hz, parameters.frequency, power, come)
-        late = 1.0 - at(alone_band, parameters.frequency) * come
-        lagging = parameters.frequency, power * abs(late) ** 2
-        self.crossover_hz = parameters.crossover or best_crossover(slow, fast, order, *lagging) / (2.0 * math.pi)
-        crossover = 2.0 * math.pi * self.crossover_hz
-        share = at(low_pass(order, crossover), parameters.frequency)
+        named = np.array([parameters.frequency])
+        alone_band, alone = _best_alone(slow, slow_rate_hz, parameters.frequency, power, complex(come(named)[0]))
+
+        def lateness(freq_hz: FloatArray) -> ComplexArray:
+            return 1.0 - over(alone_band, freq_hz) * come(freq_hz)
+
+        late = complex(lateness(named)[0])
+        if parameters.crossover is None:
+            loop = self._best_loop(
+                slow, fast, alone_band, Lag(parameters.frequency, lambda f: power * np.abs(lateness(f)) ** 2)
+            )
+        else:
+            loop = butterworth_loop(self.order, 2.0 * math.pi * parameters.crossover)
+        self.loop, self.crossover_hz = loop, loop.crossover / (2.0 * math.pi)
+        low = loop.low_pass()
+        share = at(low, parameters.frequency)
 
         def candidate(bandwidth_hz: float) -> FloatArray:
             band = band_end(slow, fast, 2.0 * math.pi * bandwidth_hz)
-            lag = power * abs((1.0 - share) * (1.0 - at(band, parameters.frequency)) + share * late) ** 2
-            paths = parallel(slow, fast, order, crossover, band)
-            return lag + noise_variance(paths, self.model, self._slow, self._fast)
+            whole = power * abs((1.0 - share) * (1.0 - at(band, parameters.frequency)) + share * late) ** 2
+            paths = parallel(slow, fast, loop, band)
+            return whole + noise_variance(paths, self.model, self._slow, self._fast)
 
         self.bandwidth_hz = parameters.bandwidth or _best_bandwidth(candidate, self.model.sample_rate_hz)
         self._settled = candidate(self.bandwidth_hz)
@@ -145,6 +172,7 @@ class TwoPaths(BlockFilter):
         of_fast, of_slow = (_stepped(inverted(*one), T) for one in ((fast, band), (slow, alone_band)))
         self._paths = of_fast, (*of_slow, beginning.modes)
         self._x = tuple(np.zeros(path[0].shape[0]) for path in self._paths)
+        fading = -math.expm1(-loop.leak * T) / loop.leak if loop.leak else T
         rest = parameters.start == "rest"
         spread = unknown_spread([belief[name] for name in self.model.sensors])
         unknown = spread.constant**2 + spread.alternating**2
@@ -152,9 +180,9 @@ class TwoPaths(BlockFilter):
         self._setting = np.array(
             [
                 T,
-                crossover,
-                crossover**2 if order == 2 else 0.0,
-                math.sqrt(order),
+                loop.crossover,
+                loop.slope_gain * fading,
+                loop.gain / loop.crossover,
                 density,
                 alone,
                 2.0 * math.pi * parameters.frequency,
@@ -165,19 +193,28 @@ class TwoPaths(BlockFilter):
                 _drift(fast, 1e-3 * self.crossover_hz),
                 parameters.rest_rate * fast.numerator[-1] / fast.denominator[-1] if rest else 0.0,
                 math.sqrt(_drift(fast, 1e-3 * self.crossover_hz)) / fast.output_noise,
-                slow_variance(slow, fast, order, crossover),
+                slow_variance(slow, fast, low),
                 parameters.rest_rate * slow.numerator[-1] / slow.denominator[-1] if rest else 0.0,
                 beginning.share * spread.alternating,
                 spread.alternating**2,
                 math.exp(-2.0 * beginning.fastest * T),
                 _MEAN_OVER * slow_rate_hz,
                 slow_rate_hz / (math.sqrt(2.0) * math.pi * _ALTERNATING_HZ),
+                math.exp(-loop.leak * T),
             ]
         )
         self._memory = np.zeros(MEMORY_ENTRIES)
         self._memory[VARIANCE] = REST_STD**2 if rest else unknown
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    def _best_loop(self, slow: SensorBelief, fast: SensorBelief, band: tuple[FloatArray, FloatArray], lag: Lag) -> Loop:
+        """Return the loop for what is believed of the noise, of the slow path's band end, and of how it errs."""
+        freq_hz = lag.freq_hz
+        return butterworth_loop(
+            self.order, best_crossover(slow, fast, self.order, freq_hz, float(lag.of(np.array([freq_hz]))[0]))
+        )
+
+    # Its paths step at regular steps only.
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
 
 
@@ -221,11 +258,13 @@ def _refuse_delay(belief: Mapping[str, SensorBelief]) -> None:
         raise ValueError(msg)
 
 
-def _as_they_come(slow: SensorBelief, freq_hz: float, sample_rate_hz: float) -> complex:
-    """Return readings over a sine, held for their interval: half of it late [-]."""
-    return complex(slow.realisation().response(np.array([freq_hz]))[0]) * cmath.exp(
-        -1j * math.pi * freq_hz / sample_rate_hz
-    )
+def _as_they_come(slow: SensorBelief, freq_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:
+    """Return readings over a sine, held for their interval: half of it late; shape of the frequencies [-].
+
+    The mean over an interval, as optical gyros read, has its first zero at the rate of the readings.
+    """
+    held: ComplexArray = np.exp(-1j * np.pi * freq_hz / sample_rate_hz)
+    return slow.realisation().response(freq_hz) * held
 
 
 def _drift(fast: SensorBelief, freq_hz: float) -> float:

@@ -11,11 +11,9 @@ b_m the Butterworth polynomial: they lag in the m-th derivative only.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import block_diag, expm
 from scipy.optimize import minimize_scalar
 from scipy.signal import buttap
 
@@ -25,56 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from testbed.fusion.realisation import Realisation
-    from testbed.signals import FloatArray
+    from testbed.signals import ComplexArray, FloatArray
 
 # Order of the band end: the rate through three integrators, as in the optimum of most signals.
 BAND_ORDER = 3
 # Where the two sensors are compared, and the crossover is looked for.
 LOW_HZ, HIGH_HZ = 1e-5, 1e3
-
-
-@dataclass(frozen=True)
-class Paths:
-    r"""The two paths in continuous time: x' = A x + B z + E h, rate = C x + D z, predicted slow reading = H x + J z.
-
-    z is the fast reading, h what is held of the slow one: the reading, or what it has beyond the prediction.
-
-    Parameters
-    ----------
-    A : ndarray, shape (n_state, n_state)
-        Dynamics [1/s].
-    B, E, C, H : ndarray, shape (n_state,)
-        Inputs [1/s] and outputs [-].
-    D, J : float
-        Feed-through [-].
-    innovate : bool
-        h is the innovation of the slow sensor and not its reading.
-    """
-
-    A: FloatArray
-    B: FloatArray
-    E: FloatArray
-    C: FloatArray
-    D: float
-    H: FloatArray
-    J: float
-    innovate: bool
-
-    def discrete(self, T: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return (Phi, Gamma, ramp, E) over a step T [s], exact for z linear and h constant between samples.
-
-        Parameters
-        ----------
-        T : float
-            Step [s].
-        """
-        n = len(self.A)
-        block = np.zeros((n + 3, n + 3))
-        block[:n, :n], block[:n, n], block[:n, n + 2] = self.A * T, self.B * T, self.E * T
-        block[n, n + 1] = 1.0
-        power = expm(block)
-        Phi, Gamma, ramp, E = power[:n, :n], power[:n, n], power[:n, n + 1], power[:n, n + 2]
-        return Phi.copy(), Gamma.copy(), ramp.copy(), E.copy()
 
 
 def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray, FloatArray]:
@@ -104,8 +58,22 @@ def at(fraction: tuple[FloatArray, FloatArray], freq_hz: float) -> complex:
     freq_hz : float
         [Hz].
     """
-    s = 2j * math.pi * freq_hz
-    return complex(np.polyval(fraction[0], s) / np.polyval(fraction[1], s))
+    return complex(over(fraction, np.array([freq_hz]))[0])
+
+
+def over(fraction: tuple[FloatArray, FloatArray], freq_hz: FloatArray) -> ComplexArray:
+    """Return numerator over denominator in s at frequencies, shape (n_freq,) [-].
+
+    Parameters
+    ----------
+    fraction : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator, highest power first.
+    freq_hz : ndarray, shape (n_freq,)
+        [Hz].
+    """
+    s = 2j * np.pi * freq_hz
+    value: ComplexArray = np.polyval(fraction[0], s) / np.polyval(fraction[1], s)
+    return value
 
 
 def input_psd(sensor: SensorBelief) -> Callable[[FloatArray], FloatArray]:
@@ -237,57 +205,6 @@ def zeros_at_dc(sensor: SensorBelief) -> int:
     """
     b = np.array(sensor.numerator)
     return b.size - np.trim_zeros(b, "b").size
-
-
-def parallel(
-    slow: SensorBelief, fast: SensorBelief, order: int, crossover: float, band: tuple[FloatArray, FloatArray]
-) -> Paths:
-    """Return both paths side by side with a fixed crossover, and the slow sensor's model driven by their sum.
-
-    Parameters
-    ----------
-    slow, fast : SensorBelief
-        The sensor that is better at low frequency, and the other.
-    order : int
-        Of the low-pass L [-].
-    crossover : float
-        [rad/s].
-    band : tuple of ndarray, shapes (n_num,), (n_den,)
-        Numerator and denominator of B in s.
-
-    Raises
-    ------
-    ValueError
-        If a sensor's inverse is unstable.
-    """
-    of_slow, poles = low_pass(order, crossover)
-    # The zeros of 1 - L at s = 0 take those of the fast sensor away.
-    of_fast = np.concatenate([poles[:-order], np.zeros(order - zeros_at_dc(fast))])
-    low, high = (
-        realised(_product(share, band[0], a), _product(poles, band[1], b))
-        for share, (a, b) in ((of_slow, inverse(slow)), (of_fast, inverse(fast)))
-    )
-    model = slow.realisation()
-    C, none = np.concatenate([low.C, high.C]), np.zeros(model.B.size)
-    return Paths(
-        A=np.block(
-            [
-                [block_diag(low.A, high.A), np.zeros((C.size, none.size))],
-                [np.outer(model.B, C), model.A],
-            ]
-        ),
-        B=np.concatenate([np.zeros(low.B.size), high.B, high.D * model.B]),
-        E=np.concatenate([low.B, np.zeros(high.B.size), none]),
-        C=np.concatenate([C, none]),
-        D=high.D,
-        H=np.concatenate([model.D * C, model.C]),
-        J=model.D * high.D,
-        innovate=False,
-    )
-
-
-def _product(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
-    return np.asarray(np.polymul(np.polymul(first, second), third), float)
 
 
 def inverted(sensor: SensorBelief, band: tuple[FloatArray, FloatArray]) -> Realisation:

@@ -31,17 +31,18 @@ SLOW_INNOVATION = 2
     RISING,
 ) = range(15)
 MEMORY_ENTRIES = 15
-# Entries of `setting`: step [s]; crossover and slope gain of the settled loop [rad/s], [rad^2/s^2]; its proportional
-# gain over the crossover [-]; density of the slow path's noise [rad^2/s]; variance of the slow path alone
-# [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor counts as missing; the rate of
-# rest, NaN if the start is unknown [rad/s]; what is left of the slow modes after a step [-].
+# Entries of `setting`: step [s]; crossover of the settled loop [rad/s]; what its slope takes of an error over a step
+# [rad/s]; its proportional gain over the crossover [-]; density of the slow path's noise [rad^2/s]; variance of the
+# slow path alone [rad^2/s^2]; w [rad/s] and power [rad^2/s^2] of the sine; steps until the slow sensor counts as
+# missing; the rate of rest, NaN if the start is unknown [rad/s]; what is left of the slow modes after a step [-].
 PERIOD, CROSSOVER, SLOPE_GAIN, GAIN, DENSITY, ALONE, TURN, POWER, PATIENCE, REST, UPRIGHT = range(11)
 # The fast path's drift by itself [rad^2/s^3], the fast reading at rest [rad/s], and the share of a change that the fast
 # sensor forgets in a second [1/s]; variance that slow noise leaves behind the settled loop [rad^2/s^2]; the slow
 # reading at rest [rad/s]; what an alternating rate leaves in the slow modes if they begin at its first value [rad/s];
 # variance of the fast modes there [rad^2/s^2] and what is left of it after a step [-]; readings that the mean at the
-# beginning is over [-], and how many make a radian of the alternating rate [-].
-DRIFT, REST_READING, FORGOTTEN, SLOW, REST_SLOW, LEAN, ROUGH, CALM, MEAN_OVER, RADIAN = range(11, 21)
+# beginning is over [-], and how many make a radian of the alternating rate [-]. What is left of the slope after a step
+# [-].
+DRIFT, REST_READING, FORGOTTEN, SLOW, REST_SLOW, LEAN, ROUGH, CALM, MEAN_OVER, RADIAN, FADE = range(11, 22)
 
 
 @njit(cache=True, error_model="numpy")
@@ -175,14 +176,16 @@ def two_paths(x_fast, x_slow, fast_path, slow_path, memory, settled, setting, fa
                 density = setting[DENSITY] - 2.0 * T * memory[RISING] / np.log(setting[CALM])
                 c = crossover * np.sqrt(setting[DENSITY] / density)
                 w, turn = memory[VARIANCE] / density, np.tanh(c * T)
-                gain = max(w, setting[GAIN] * min(w, crossover))
+                # From w at first to the settled gain, whichever is the larger.
+                gain = max(w + min(setting[GAIN] - 1.0, 0.0) * crossover, setting[GAIN] * min(w, crossover))
                 share = 1.0 - np.exp(-gain * T)
                 memory[ADDED] += share * e + T * memory[SLOPE]
                 memory[TAKEN] += share * (memory[LEFT] - memory[TAKEN])
-                memory[SLOPE] += T * setting[SLOPE_GAIN] * e
+                memory[SLOPE] = setting[FADE] * memory[SLOPE] + setting[SLOPE_GAIN] * e
                 memory[VARIANCE] = density * c * (w + c * turn) / (c + w * turn)
         else:
             memory[ADDED] += T * memory[SLOPE]
+            memory[SLOPE] *= setting[FADE]
             if started:
                 memory[VARIANCE] += setting[DRIFT] * T
         step = int(memory[STEP])

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.fusion.two_paths.design import input_psd, low_pass
+from testbed.fusion.two_paths.design import input_psd
 
 if TYPE_CHECKING:
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
-    from testbed.fusion.two_paths.design import Paths
+    from testbed.fusion.two_paths.paths import Paths
     from testbed.signals import FloatArray
 
 _DOUBLINGS = 40
@@ -90,7 +90,7 @@ def _joint_steps(
     return [take @ move, *[move] * pause], [due, *[noise] * pause], read
 
 
-def slow_variance(slow: SensorBelief, fast: SensorBelief, order: int, crossover: float) -> float:
+def slow_variance(slow: SensorBelief, fast: SensorBelief, low: tuple[FloatArray, FloatArray]) -> float:
     r"""Return the variance that the slow noise of both sensors leaves behind the loop [rad^2/s^2].
 
     .. math:: 2 \int |L|^2 S_{slow} + |1 - L|^2 S_{fast} / |G_{fast}|^2 \, df
@@ -99,15 +99,12 @@ def slow_variance(slow: SensorBelief, fast: SensorBelief, order: int, crossover:
     ----------
     slow, fast : SensorBelief
         The sensor that is better at low frequency, and the other.
-    order : int
-        Of the low-pass L [-].
-    crossover : float
-        [rad/s].
+    low : tuple of ndarray, shapes (n_num,), (n_den,)
+        Numerator and denominator of L in s.
     """
     freq = np.geomspace(_LOWEST_HZ, _HIGHEST_HZ, 800)
     s = 2j * np.pi * freq
-    b, a = low_pass(order, crossover)
-    L = np.polyval(b, s) / np.polyval(a, s)
+    L = np.polyval(low[0], s) / np.polyval(low[1], s)
     of_slow, of_fast = (one.slow_density(freq) / np.abs(one.realisation().response(freq)) ** 2 for one in (slow, fast))
     density = np.abs(L) ** 2 * of_slow + np.abs(1.0 - L) ** 2 * of_fast
     return float(2.0 * np.trapezoid(density * freq, np.log(freq)))

@@ -32,4 +32,5 @@ def write_hdf5(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
             for stamps, values in track.blocks():
                 time[start : start + stamps.size], rate[start : start + stamps.size] = stamps, values
                 start += stamps.size
-    return {track.name: {"file": FILE, "column": f"{track.name}/rate"} for track in tracks}
+    names = [track.name for track in tracks]
+    return {name: {"file": FILE, "column": f"{name}/rate", "stamps": f"{name}/time"} for name in names}

@@ -32,4 +32,5 @@ def write_mcap(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
                 for stamp, value in zip(stamps.tolist(), rate.tolist(), strict=True):
                     writer.add_message(channel, stamp, _HEAD + _MESSAGE.pack(value)[4:], stamp)
         writer.finish()
-    return {track.name: {"file": FILE, "column": f"/{track.name}/data"} for track in tracks}
+    names = [track.name for track in tracks]
+    return {name: {"file": FILE, "column": f"/{name}/data", "stamps": f"/{name}/log_time_ns"} for name in names}

@@ -33,4 +33,6 @@ def write_mdf(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str]
                     signal = Signal(np.array(rate), seconds, name=track.name, unit="rad/s")
                     file.append([signal], acq_name=track.name)
         file.save(folder / FILE, overwrite=True)
-    return {track.name: {"file": FILE, "column": track.name} for track in tracks}
+    # The reader names groups where there are several.
+    clocks = {track.name: f"{track.name}/time" if len(tracks) > 1 else "time" for track in tracks}
+    return {track.name: {"file": FILE, "column": track.name, "stamps": clocks[track.name]} for track in tracks}

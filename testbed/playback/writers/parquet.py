@@ -25,4 +25,4 @@ def write_parquet(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, 
         with parquet.ParquetWriter(folder / f"{track.name}.parquet", schema) as file:
             for stamps, rate in track.blocks():
                 file.write_table(pa.table([stamps, rate], schema))
-    return {track.name: {"file": f"{track.name}.parquet", "column": RATE} for track in tracks}
+    return {track.name: {"file": f"{track.name}.parquet", "column": RATE, "stamps": TIME} for track in tracks}

@@ -25,4 +25,6 @@ def write_tdms(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
             for stamps, rate in track.blocks():
                 times = ChannelObject(track.name, "t", stamps, properties={"unit_string": "ns"})
                 file.write_segment([times, ChannelObject(track.name, track.name, rate, properties=waveform)])
-    return {track.name: {"file": FILE, "column": track.name} for track in tracks}
+    # The reader names groups where there are several.
+    clocks = {track.name: f"{track.name}/t" if len(tracks) > 1 else "t" for track in tracks}
+    return {track.name: {"file": FILE, "column": track.name, "stamps": clocks[track.name]} for track in tracks}

@@ -26,7 +26,7 @@ def write_csv(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str]
     Returns
     -------
     dict of str to dict
-        What a map says of each channel: file and column.
+        Where each channel stands: file, column, and the column of its stamps.
     """
     import pyarrow as pa
     from pyarrow import csv
@@ -36,4 +36,4 @@ def write_csv(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str]
         with csv.CSVWriter(folder / f"{track.name}.csv", schema) as file:
             for stamps, rate in track.blocks():
                 file.write_table(pa.table([stamps, rate], schema))
-    return {track.name: {"file": f"{track.name}.csv", "column": RATE} for track in tracks}
+    return {track.name: {"file": f"{track.name}.csv", "column": RATE, "stamps": TIME} for track in tracks}

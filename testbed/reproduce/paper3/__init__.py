@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from testbed.compensation import paper3
+from testbed.compensation import paper3, rivals
 from testbed.compensation.fading import choose_ratio, fading_memory
 from testbed.compensation.features import Features
 from testbed.compensation.model_only import train
@@ -25,6 +25,7 @@ from testbed.drift.summary import audit_summary
 from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
+from testbed.reproduce.paper3.figures import Decomposed, write_figures_10_to_14
 from testbed.reproduce.paper3.page import page
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from testbed.compensation.model_only import DriftModel
-    from testbed.drift.findings import Audit
     from testbed.sensors.fog import Fog
     from testbed.signals import FloatArray
 
@@ -179,6 +179,10 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
     yield Contender(ORIGINAL, "-", lambda record: record.rate)
     yield Contender(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
     yield Contender("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
+    trials = protocol.options.trials
+    yield Contender("AKF [22]", "-", lambda record: rivals.akf22(record, seed=seed))
+    yield Contender("OLMD-KPCA", "-", lambda record: rivals.olmd_kpca(record, seed=seed))
+    yield Contender("CEEMDAN-LWT", "-", lambda record: rivals.ceemdan_lwt(record, seed=seed, trials=trials))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
@@ -203,7 +207,8 @@ def _applied(model: DriftModel) -> Compensate:
 
 
 def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iterator[str]:
-    """Write table_2.csv, paper3.html and the audits of the first seed, and yield the table line by line.
+    """Write table_2.csv, paper3.html, figures 10 to 14 and the audits of the first seed, and yield the table line by
+    line.
 
     Parameters
     ----------
@@ -222,7 +227,7 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     protocol = protocol or DriftProtocol()
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     folders: dict[str, str] = {}
-    audits: dict[str, Audit] = {}
+    first: dict[str, Audited] = {}
     for seed in range(1, seeds + 1):
         thermal = cycle("paper", seed, protocol.sample_rate_hz)
         for case in cases(seed, protocol):
@@ -236,19 +241,23 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
             )
             if seed == 1:
                 folders[_title(case)] = f"audit_{case.name}_{case.trained_on}".translate(_PLAIN)
-                audits[_title(case)] = audited.audit
+                first[_title(case)] = audited
                 write_audit(audited, out / folders[_title(case)])
     rows = [(*key, *_medians(runs)) for key, runs in found.items()]
     write_text(out / "table_2.csv", _csv(rows, found))
+    audits = {name: audited.audit for name, audited in first.items()}
     write_text(out / "paper3.html", page(_shown(rows, found), audits, list(folders.values()), seeds))
     yield from _printed(rows, found, seeds)
+    yield ""
+    yield "figures of the first seed (SVG and PNG, the numbers in CSV)"
+    yield from write_figures_10_to_14(Decomposed.of(first[ORIGINAL].thermal, protocol.options, 1), first, out)
 
 
 def _title(case: Contender) -> str:
     return case.name if case.trained_on in ("-", "this record") else f"{case.name}, {case.trained_on}"
 
 
-_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None})
+_PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None, "[": None, "]": None})
 
 
 def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:
@@ -316,14 +325,14 @@ def _printed(
         "model does not describe the curve"
     )
     heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks", "refused")
-    yield f"{'method':20s}{'trained on':18s}" + "".join(f"{head:>11s}" for head in heads)
+    yield f"{'method':31s}{'trained on':16s}" + "".join(f"{head:>11s}" for head in heads)
     for name, trained_on, *values in rows:
         at = dict(zip(COLUMNS, values, strict=True))
         paper = TABLE_2.get(name, (None,) * 4)
         shown = [at["bias_instability_deg_h"], at["angle_random_walk_deg_sqrt_h"], paper[1], paper[2]]
         shown += [at[key] for key in ("drift_reduction", "oracle_ratio_1h", "least_gain_in_drift_band", "step_gain")]
         verdicts = "".join(f"{n:>9d}/{seeds}" for n in _verdicts(found[name, trained_on]))
-        yield f"{name:20s}{trained_on:18s}" + "".join(f"{_short(value):>11s}" for value in shown) + verdicts
+        yield f"{name:31s}{trained_on:16s}" + "".join(f"{_short(value):>11s}" for value in shown) + verdicts
 
 
 def _text(value: float | None) -> str:

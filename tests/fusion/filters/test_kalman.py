@@ -13,6 +13,7 @@ from testbed.fusion.belief import default_belief
 from testbed.fusion.filters.kalman import Kalman, KalmanParameters
 from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model import FusionModel, build_model, covariance_root
+from testbed.fusion.transitions import even
 from testbed.signals import FloatArray, random_stream
 
 DEG = np.pi / 180.0
@@ -23,7 +24,17 @@ Q_RATE = 0.3 * DEG**2
 def _run(model: FusionModel, Z: FloatArray, x: FloatArray, P: FloatArray) -> FloatArray:
     out = np.empty((2 + 2 * len(model.H), Z.shape[1]))
     kalman_kernel(x.size, len(model.H))(
-        x, P, model.F, model.Q, model.H, model.R, Z, np.zeros(len(model.H), dtype=int), False, out
+        x,
+        P,
+        model.F,
+        model.Q,
+        model.H,
+        model.R,
+        Z,
+        even(model.F, model.Q),
+        np.zeros(len(model.H), dtype=int),
+        False,
+        out,
     )
     return out
 

@@ -14,6 +14,7 @@ from testbed.fusion.belief import default_belief
 from testbed.fusion.filters import kalman, shakf, steady_state, wideband
 from testbed.fusion.kernels.covariance import HEADER_ROWS, kalman_kernel, predict, update
 from testbed.fusion.model import build_model
+from testbed.fusion.transitions import even
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -47,7 +48,9 @@ def test_kernel_equals_the_joint_matrix_form(reference: Any, order: int) -> None
     Z[:, 0] = np.nan
     wanted = reference.run(model, Z, [reference.sensor(R=value) for value in model.R])
     x, P, out = np.zeros(len(model.F)), model.P0.copy(), np.empty((6, Z.shape[1]))
-    kalman_kernel(x.size, 2)(x, P, model.F, model.Q, model.H, model.R, Z, np.zeros(2, dtype=int), False, out)
+    kalman_kernel(x.size, 2)(
+        x, P, model.F, model.Q, model.H, model.R, Z, even(model.F, model.Q), np.zeros(2, dtype=int), False, out
+    )
     # P starts 1e8 times above what the first reading leaves, so the matrix form keeps eps * 1e8 of it.
     scale = np.radians(1.0)
     np.testing.assert_allclose(out[0], wanted["rate"], rtol=0, atol=1e-8 * scale)
@@ -117,7 +120,9 @@ def test_nothing_is_predicted_before_the_first_reading() -> None:
     Z = np.full((2, 50), np.nan)
     Z[1, ::2] = np.inf
     x, P, out = np.zeros(5), model.P0.copy(), np.empty((6, 50))
-    assert not kalman_kernel(5, 2)(x, P, model.F, model.Q, model.H, model.R, Z, np.zeros(2, dtype=int), False, out)
+    assert not kalman_kernel(5, 2)(
+        x, P, model.F, model.Q, model.H, model.R, Z, even(model.F, model.Q), np.zeros(2, dtype=int), False, out
+    )
     assert np.array_equal(P, model.P0)
     assert np.array_equal(out[1], np.full(50, np.sqrt(model.P0[0, 0])))
 

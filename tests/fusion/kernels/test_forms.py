@@ -22,6 +22,7 @@ from testbed.fusion.kernels.covariance import (
     update_root,
 )
 from testbed.fusion.model import build_model, covariance_root
+from testbed.fusion.transitions import even
 from testbed.signals import random_stream
 
 if TYPE_CHECKING:
@@ -98,7 +99,9 @@ def test_single_precision_is_single_throughout(form: int) -> None:
     Z = 0.1 * random_stream(3, "single").standard_normal((1, 200))
     out = np.empty((4, 200))
     x, P = np.float32(0.0), np.float32(0.07)
-    kalman_kernel(1, 1, form)(x * one[0], P * one, one, Q * one, one, R * one[0], Z, np.zeros(1, dtype=int), False, out)
+    kalman_kernel(1, 1, form)(
+        x * one[0], P * one, one, Q * one, one, R * one[0], Z, even(one, one), np.zeros(1, dtype=int), False, out
+    )
     for k, z in enumerate(Z[0].astype(np.float32)):
         P = P + Q * np.float32(k > 0)
         K, e = P / (R + P), z - x
@@ -242,7 +245,9 @@ def test_a_rate_that_is_lost_goes_back_as_if_read_at_zero(form: int) -> None:
             expected_x, expected_P = expected_x - K[:, 0] * expected_x[0], expected_P - K @ (H @ expected_P)
     out, Z = np.empty((4, 5)), np.full((1, 5), np.nan)
     carried, noise = (covariance_root(one) if form == SQUARE_ROOT else one for one in (P, Q))
-    kalman_kernel(n, 1, form)(x, carried, F, noise, H, np.array([1.0]), Z, np.zeros(1, dtype=int), True, out)
+    kalman_kernel(n, 1, form)(
+        x, carried, F, noise, H, np.array([1.0]), Z, even(F, noise), np.zeros(1, dtype=int), True, out
+    )
     left = carried @ carried.T if form == SQUARE_ROOT else carried
     assert expected_P[0, 0] == pytest.approx(LOST_VARIANCE)
     np.testing.assert_allclose(left, expected_P, rtol=1e-12)

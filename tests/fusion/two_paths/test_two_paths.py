@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -12,14 +12,24 @@ from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.filters.blending import Blending
 from testbed.fusion.filters.complementary import Complementary
 from testbed.fusion.model import build_model
-from testbed.fusion.two_paths.base import TwoPathParameters
-from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass, parallel
+from testbed.fusion.two_paths.design import band_end, best_crossover, low_pass
 from testbed.fusion.two_paths.kernel import DENSITY, VARIANCE
 from testbed.fusion.two_paths.noise import noise_variance
+from testbed.fusion.two_paths.paths import parallel
+
+if TYPE_CHECKING:
+    from testbed.fusion.two_paths.base import TwoPathParameters
 
 DEG = np.pi / 180.0
 RATES = {"mems_gyro": 2000.0, "mhd_ars": 20000.0}
 FILTERS = [Complementary, Blending]
+
+
+def one_pole(cls: Any, **parameters: Any) -> TwoPathParameters:
+    """Return parameters with which a filter has the Butterworth loop of its order."""
+    return cls.Parameters(**({"poles": 1} if cls is Complementary else {}), **parameters)
+
+
 N, SMALL, CORNER = 4e-5, 1e-7, 15.0
 # A white gyro and a white high-pass: the textbook pair.
 PLAIN = {
@@ -54,7 +64,7 @@ def test_crossover_is_the_closed_form(order: int, divisor: float) -> None:
 
 @pytest.mark.parametrize(("cls", "crossover"), [(Complementary, 5.60e-3), (Blending, 3.24e-3)])
 def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) -> None:
-    found = cls(white(load_belief("identified")), RATES, TwoPathParameters())
+    found = cls(white(load_belief("identified")), RATES, one_pole(cls))
     assert found.crossover_hz == pytest.approx(crossover, rel=2e-3, abs=0.0)
     # The search ends within 1 %.
     assert found.bandwidth_hz == pytest.approx(169.0, rel=0.02)
@@ -63,10 +73,10 @@ def test_derived_parameters_are_those_of_the_docs(cls: Any, crossover: float) ->
 @pytest.mark.oracle
 def test_no_first_order_crossover_beats_the_derived_one_and_the_optimum_is_not_beaten() -> None:
     belief = white(load_belief("identified"))
-    best = Complementary(belief, RATES, TwoPathParameters())
+    best = Complementary(belief, RATES, one_pole(Complementary))
 
     def claimed(**own: float) -> float:
-        return float(np.sqrt(Complementary(belief, RATES, TwoPathParameters(**own))._settled.mean()))
+        return float(np.sqrt(Complementary(belief, RATES, one_pole(Complementary, **own))._settled.mean()))
 
     least = claimed()
     for factor in (0.8, 1.25):
@@ -96,7 +106,7 @@ def test_exact_readings_of_a_sine_give_the_band_end(cls: Any, freq: float) -> No
     """Paths add up to B: the error of a settled sine is |1 - B| A, whatever the share of the sensors (crossover inside
     the test).
     """
-    p = TwoPathParameters(crossover=2.0, bandwidth=300.0)
+    p = cls.Parameters(crossover=2.0, bandwidth=300.0)
     found = cls(QUICK, RATES, p)
     t = np.arange(40_000) / 20_000.0
     phase = 2j * np.pi * freq * t
@@ -147,7 +157,7 @@ def noise_of_many() -> np.ndarray:
 def test_claimed_noise_is_the_scatter_of_many_runs(cls: Any, noise_of_many: np.ndarray) -> None:
     power, claimed = [], 0.0
     for run in range(60):
-        found = cls(QUICK, RATES, TwoPathParameters(amplitude=1e-12, bandwidth=300.0, start="rest"))
+        found = cls(QUICK, RATES, cls.Parameters(amplitude=1e-12, bandwidth=300.0, start="rest"))
         block = found.process({"mems_gyro": noise_of_many[::10, 0, run], "mhd_ars": noise_of_many[:, 1, run]})
         power.append(np.mean(block.rate[12_000:] ** 2))
         claimed = float(np.sqrt(np.mean(block.std[-10:] ** 2)))
@@ -166,9 +176,9 @@ def test_noise_variance_of_the_plain_pair_is_the_closed_form(cls: Any, factor: f
     noise = {"input_noise": 1e-9, "output_noise": 1e-9, where: N}
     slow = PLAIN["mems_gyro"].model_copy(update=noise)
     fast = PLAIN["mhd_ars"]
-    found = cls({"mems_gyro": slow, "mhd_ars": fast}, RATES, TwoPathParameters(bandwidth=20.0))
+    found = cls({"mems_gyro": slow, "mhd_ars": fast}, RATES, one_pole(cls, bandwidth=20.0))
     band = band_end(slow, fast, 2.0 * np.pi * 20.0)
-    paths = parallel(slow, fast, cls.order, 2.0 * np.pi * found.crossover_hz, band)
+    paths = parallel(slow, fast, found.loop, band)
     wanted = factor * N * SMALL * CORNER + 5.0 / 3.0 * 2.0 * np.pi * 20.0 * SMALL**2
     # The crossover is within 2 % of its flat minimum; sampling folds (a T)^2 / 12 = 0.2 % of the gyro's noise back.
     assert noise_variance(paths, found.model, 0, 1).mean() == pytest.approx(wanted, rel=0.006, abs=0.0)
@@ -181,7 +191,7 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
     belief = white(load_belief("identified"))
     response = belief["mhd_ars"].realisation().response(np.array([10.0]))[0]
     z = {"mhd_ars": (DEG * response * np.exp(20j * np.pi * t)).imag, "mems_gyro": np.full(4000, np.nan)}
-    block = cls(belief, RATES, TwoPathParameters(start="rest")).process(z)
+    block = cls(belief, RATES, cls.Parameters(start="rest")).process(z)
     # 1 % of the amplitude: the start-up of a sine that was there before.
     assert np.std((block.rate - DEG * np.sin(20.0 * np.pi * t))[20_000:]) < 0.01 * DEG
     low = 2.0 * np.pi * 1e-4
@@ -196,7 +206,7 @@ def test_a_lost_slow_sensor_leaves_the_fast_one_and_its_drift(cls: Any) -> None:
 def test_drift_is_forgotten_once_the_slow_sensor_is_back(cls: Any) -> None:
     """The scalar Riccati equation w' = w_c^2 - w^2 has the solution w_c coth(w_c t + c), p = N^2 w."""
     z = {"mems_gyro": np.zeros(10_000), "mhd_ars": np.zeros(100_000)}
-    p = TwoPathParameters(crossover=0.5, gate=False, start="rest")
+    p = cls.Parameters(crossover=0.5, gate=False, start="rest")
     whole = cls(QUICK, RATES, p).process(z).std
     z["mems_gyro"][6500:8000] = np.nan
     found = cls(QUICK, RATES, p)
@@ -217,7 +227,7 @@ def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> N
     """
     left = {}
     for cls in FILTERS:
-        found = cls(QUICK, RATES, TwoPathParameters(crossover=1.0, bandwidth=300.0, gate=False))
+        found = cls(QUICK, RATES, cls.Parameters(crossover=1.0, bandwidth=300.0, gate=False))
         z = {"mems_gyro": np.zeros(8000), "mhd_ars": np.full(80_000, 1e-4)}
         left[cls] = abs(found.process(z).rate[-1]) / 1e-4
     low = 1e-3
@@ -230,12 +240,12 @@ def test_an_offset_of_the_fast_sensor_is_integrated_away_by_blending_only() -> N
 def test_sensors_that_cannot_be_joined_are_refused(cls: Any) -> None:
     good = dict(load_belief("eq39"))
     with pytest.raises(ValueError, match="belief: expected two sensors"):
-        cls(good, {"mhd_ars": 20_000.0}, TwoPathParameters())
+        cls(good, {"mhd_ars": 20_000.0}, cls.Parameters())
     with pytest.raises(ValueError, match="highest sample rate"):
-        cls(good, {"mhd_ars": 2000.0, "mems_gyro": 20_000.0}, TwoPathParameters())
+        cls(good, {"mhd_ars": 2000.0, "mems_gyro": 20_000.0}, cls.Parameters())
     right = SensorBelief(numerator=(-2000.0, 5e4, 0.0), denominator=(0.255, 2178.0, 33900.0), output_noise=1e-7)
     with pytest.raises(ValueError, match="inverse is stable"):
-        cls(good | {"mhd_ars": right}, RATES, TwoPathParameters())
+        cls(good | {"mhd_ars": right}, RATES, cls.Parameters())
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -243,7 +253,7 @@ def test_a_zero_far_beyond_the_clock_is_a_constant(cls: Any) -> None:
     """A fit may leave one; inverted it would be a jump from one noisy reading to the next."""
     fast = PLAIN["mhd_ars"]
     far = fast.model_copy(update={"numerator": tuple(np.polymul(fast.numerator, [1e-8, 1.0]))})
-    plain, same = (cls(PLAIN | {"mhd_ars": one}, RATES, TwoPathParameters()) for one in (fast, far))
+    plain, same = (cls(PLAIN | {"mhd_ars": one}, RATES, cls.Parameters()) for one in (fast, far))
     noise = 1e-5 * np.random.default_rng(3).standard_normal(2000)
     a, b = (one.process({"mhd_ars": noise, "mems_gyro": noise[::10]}).rate for one in (plain, same))
     # Up to half the clock the zero changes the sensor by 6e4 / 1e8.
@@ -256,7 +266,7 @@ def test_a_fast_sensor_with_two_zeros_at_dc_is_refused(cls: Any) -> None:
         numerator=(9000.0, 0.0, 0.0), denominator=tuple(np.poly([-9000.0, -15.0, -0.3])), output_noise=1e-7
     )
     with pytest.raises(ValueError, match="at most one zero"):
-        cls({**PLAIN, "mhd_ars": twice}, RATES, TwoPathParameters())
+        cls({**PLAIN, "mhd_ars": twice}, RATES, cls.Parameters())
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -265,7 +275,7 @@ def test_two_sensors_without_dc_are_refused(cls: Any) -> None:
     blind = load_belief("eq39")["mhd_ars"]
     belief = {"a": blind, "b": blind.model_copy(update={"output_noise": 2e-7})}
     with pytest.raises(ValueError, match="to see a constant rate"):
-        cls(belief, {"a": 20_000.0, "b": 20_000.0}, TwoPathParameters())
+        cls(belief, {"a": 20_000.0, "b": 20_000.0}, cls.Parameters())
 
 
 @pytest.mark.oracle
@@ -275,7 +285,7 @@ def test_crossover_from_the_start_is_w_coth_w_t() -> None:
     n = 200_000
     z = {"mems_gyro": np.zeros(n // 10), "mhd_ars": np.zeros(n)}
     for start, law in (("unknown", lambda x: 1.0 / np.tanh(x)), ("rest", np.tanh)):
-        found = Complementary(belief, RATES, TwoPathParameters(start=start, gate=False))
+        found = Complementary(belief, RATES, one_pole(Complementary, start=start, gate=False))
         found.process(z)
         w, N = 2.0 * np.pi * found.crossover_hz, belief["mems_gyro"].input_noise
         # The density of the slow path at the crossover, which its word adds 1e-4 to.
@@ -290,10 +300,10 @@ def test_a_lost_fast_sensor_leaves_the_slow_path(cls: Any) -> None:
     z = {"mhd_ars": 1e-5 * rng.standard_normal(30_000), "mems_gyro": 1e-5 * rng.standard_normal(3000)}
     lost = {**z, "mhd_ars": z["mhd_ars"].copy()}
     lost["mhd_ars"][10_000:20_000] = np.nan
-    found = cls(QUICK, RATES, TwoPathParameters())
+    found = cls(QUICK, RATES, cls.Parameters())
     block, other = (
         found.process(lost),
-        cls(QUICK, RATES, TwoPathParameters()).process({**lost, "mhd_ars": -lost["mhd_ars"]}),
+        cls(QUICK, RATES, cls.Parameters()).process({**lost, "mhd_ars": -lost["mhd_ars"]}),
     )
     inside = slice(11_000, 20_000)
     np.testing.assert_allclose(block.rate[inside], other.rate[inside], rtol=0.0, atol=1e-9)

@@ -1,0 +1,82 @@
+"""Cost of readings with stamps: clocks without a whole ratio, and a fast clock that jitters, over the regular steps of
+the nearest whole ratio; every filter that takes them, whole calls of `process`, interleaved in one process.
+
+Promised: at most 1.3 times the integer path at 20000/2003.704 Hz, 1.7 at 20000/6664 and 2 with a jittering fast clock.
+Run:
+python benchmarks/bench_clocks.py
+"""
+
+import argparse
+import time
+
+import numpy as np
+from promises import Promise, conclude
+
+from testbed.fusion import FILTERS
+from testbed.fusion.base import BlockFilter
+from testbed.fusion.belief import default_belief
+from testbed.parts import resolve
+from testbed.signals import FloatArray, random_stream
+
+FAST = 20_000.0
+# Rate of the slow sensor, jitter of the fast clock in its periods, the nearest whole ratio, most times its cost.
+CASES = [(2003.704, 0.0, 10, 1.3), (6664.0, 0.0, 3, 1.7), (2000.0, 0.2, 10, 2.0)]
+
+
+def record(slow_hz: float, jitter: float, n: int) -> tuple[dict[str, FloatArray], dict[str, np.ndarray]]:
+    """Return white readings of both sensors and their stamps [ns]."""
+    rates, random = {"mhd_ars": FAST, "mems_gyro": slow_hz}, random_stream(1, "clocks")
+    times = {name: np.arange(np.ceil(n / FAST * rate)) / rate for name, rate in rates.items()}
+    times["mhd_ars"] += jitter / FAST * random.uniform(0.0, 1.0, n)
+    readings = {name: 1e-3 * random.standard_normal(one.size) for name, one in times.items()}
+    return readings, {name: np.rint(1e9 * one).astype(np.int64) for name, one in times.items()}
+
+
+def seconds(kind: type[BlockFilter], rates: dict[str, float], *given: dict[str, np.ndarray]) -> float:
+    """Return the processor time of a fresh filter over a record [s]; its tables are made before."""
+    stage = kind(default_belief(), rates, kind.Parameters())
+    stage.process(*({name: one[:4] for name, one in each.items()} for each in given))
+    begin = time.process_time()
+    stage.process(*({name: one[4:] for name, one in each.items()} for each in given))
+    return time.process_time() - begin
+
+
+def ratio(kind: type[BlockFilter], case: tuple[float, float, int, float], n: int, repeats: int) -> float:
+    """Return how many times the time of regular steps it takes: the median over pairs, one after the other."""
+    slow_hz, jitter, stride, _ = case
+    readings, stamps = record(slow_hz, jitter, n)
+    whole = {"mhd_ars": readings["mhd_ars"], "mems_gyro": record(FAST / stride, 0.0, n)[0]["mems_gyro"]}
+    stepped = kind(default_belief(), {"mhd_ars": FAST, "mems_gyro": FAST / stride}, kind.Parameters())
+    found = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        stepped.process(whole)
+        regular = time.process_time() - begin
+        found.append(seconds(kind, {"mhd_ars": FAST, "mems_gyro": slow_hz}, readings, stamps) / regular)
+    return float(np.median(found))
+
+
+def main() -> None:
+    """Print the ratios of every filter."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=2.0, help="length of the record at 20 kHz")
+    parser.add_argument("--repeats", type=int, default=7, help="pairs that a ratio is the median of")
+    given = parser.parse_args()
+    n, promises = round(given.seconds * FAST / 60) * 60, []
+    for name in FILTERS:
+        kind = resolve("filter", name, FILTERS)
+        if not kind.any_clock:
+            print(f"{name}: refuses clocks without a whole ratio")
+            continue
+        for case in CASES:
+            slow_hz, jitter, stride, most = case
+            ratio(kind, case, 600, 1)
+            found = ratio(kind, case, n, given.repeats)
+            what = f"{name}, {FAST:g}/{slow_hz:g} Hz{', fast clock jitters' if jitter else ''}"
+            print(f"{what}: {found:.2f} times regular steps of {FAST:g}/{FAST / stride:g} Hz")
+            promises.append(Promise(what, most, found))
+    conclude(*promises)
+
+
+if __name__ == "__main__":
+    main()

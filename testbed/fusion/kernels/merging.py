@@ -1,0 +1,112 @@
+"""The compiled merging of readings with stamps: one step for each instant at which there is a reading.
+
+It shares the number of nodes with `testbed.fusion.kernels.covariance`; who changes it touches this file too, since
+numba's disk cache watches no other.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from testbed.fusion.kernels.covariance import NODES
+from testbed.fusion.schedule import LARGEST_RATE
+
+# What is known of a sensor: nothing yet, its last reading, or that it has been silent for too long since.
+NOTHING, HEARD, OVERDUE = range(3)
+# So many of its periods after the last reading one is missing.
+PATIENCE = 1.5
+# Steps this close to a node are taken for it, in nodes.
+NEAR = 0.01
+
+
+@njit(cache=True, error_model="numpy")
+def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PLR0912  # pragma: no cover
+    """Fill `out` with the steps of a block, advance `memory`, and return how many there are.
+
+    Parameters
+    ----------
+    time, value : ndarray, shape (n_reading,)
+        Stamps [ns], rising for each sensor, and readings [rad/s], one sensor after the other.
+    bounds : ndarray of int, shape (n_sensor + 1,)
+        Where each begins.
+    period : ndarray, shape (n_sensor,)
+        Nominal time between readings [ns].
+    fastest : int
+        The sensor whose readings are shown.
+    memory : tuple
+        (begun, last step [ns]), shape (2,); of each sensor the last stamp, what is known, and readings that came too
+        late, each of shape (n_sensor,).
+    out : tuple
+        (Z, node, share, whole, shown, stamp), with room for two steps per reading.
+    """
+    begun, now, T = memory[0][0] > 0, memory[0][1], period[fastest]
+    _, last, known, late = memory
+    Z, node, share, whole, shown, stamp = out
+    n_sensor, head, k = period.size, bounds[:-1].copy(), 0
+    for i in range(n_sensor):
+        while begun and head[i] < bounds[i + 1] and time[head[i]] < now:
+            late[i] += 1
+            head[i] += 1
+    while True:
+        there, t = False, now
+        for i in range(n_sensor):
+            if head[i] < bounds[i + 1] and (not there or time[head[i]] < t):
+                there, t = True, time[head[i]]
+        if not there:
+            break
+        j, s, first = NODES, 0.0, 0.0
+        if begun:
+            length = (t - now) / T
+            first = max(np.ceil(length - PATIENCE), 0.0)
+            place = (length - first) * NODES
+            j = int(place)
+            s = place - j
+            if s < NEAR:
+                s = 0.0
+            elif s > 1.0 - NEAR:
+                j, s = j + 1, 0.0
+            if first > 0.0:
+                # The first of them has a place of its own, where the gap is seen.
+                node[k], share[k], whole[k], shown[k], stamp[k] = NODES, 0.0, 0, False, now
+                first -= 1.0
+                for i in range(n_sensor):
+                    Z[i, k] = np.nan
+                    if known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
+                        Z[i, k], known[i] = np.inf, OVERDUE
+                k += 1
+        node[k], share[k], whole[k], shown[k], stamp[k] = j, s, int(first), False, t
+        for i in range(n_sensor):
+            Z[i, k] = np.nan
+            if head[i] < bounds[i + 1] and time[head[i]] == t:
+                z = value[head[i]]
+                Z[i, k] = z if abs(z) <= LARGEST_RATE else np.inf
+                shown[k] = shown[k] or i == fastest
+                head[i] += 1
+                last[i], known[i] = t, HEARD
+            elif known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
+                Z[i, k], known[i] = np.inf, OVERDUE
+        begun, now = True, t
+        k += 1
+    memory[0][0], memory[0][1] = begun, now
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def show_steps(out, shown, first, pending, kept, begin):  # pragma: no cover
+    """Set kept[:, begin:] = the columns of `out` that are shown; from row `first` on, where one is undefined, what the
+    columns before it gave that are not. `pending` (n_row,) is what the last ones leave for the next block.
+    """
+    for r in range(out.shape[0]):
+        held, at = pending[r], begin
+        for k in range(shown.size):
+            value = out[r, k]
+            if shown[k]:
+                kept[r, at] = held if np.isnan(value) else value
+                held = np.nan
+                at += 1
+            elif r >= first and not np.isnan(value):
+                held = value
+        pending[r] = held

@@ -1,0 +1,140 @@
+"""Bode plot: what the sensors and the filters made of the truth, beside what the filters were told of the sensors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.numbers import plain
+from testbed.pages.svg import INK, STYLE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
+
+    from testbed.metrics.transfer import Transfer
+    from testbed.runs.metrics import Response, RunMetrics
+
+_SENSOR, _FILTER = "o", "s"
+_BELIEVED = (0, (1.2, 1.6))
+# Below this gain nothing is seen of a response.
+_LEAST = 1e-3
+
+
+def shows(metrics: RunMetrics, transfers: Mapping[str, Transfer]) -> bool:
+    """Return whether there is anything to draw: a response, a line or a frequency with power."""
+    lines = any(line.gain for source in metrics.sources.values() for line in source.lines or [])
+    return metrics.responses is not None or lines or any(one.freq_hz.size for one in transfers.values())
+
+
+def bode_figure(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> Figure:
+    """Draw gain and phase over the truth, and coherence with it.
+
+    Lines are responses: of a sensor as it is built, dotted as a filter believes where that is another. Points are what
+    came out: of the commanded lines by least squares, between them by spectra where the coherence is above chance.
+
+    Parameters
+    ----------
+    metrics : RunMetrics
+        Of the run: lines, and the responses.
+    transfers : Mapping
+        Group (``sensors/mhd_ars``, ...) to what its readings or estimates are of the truth.
+    colors : Mapping
+        Group to color.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 7.0))
+        panels = figure.subplots(3, 1, sharex=True, height_ratios=[3, 3, 2])
+        gain, phase, _ = panels
+        for response, color, style in _responses(metrics, colors):
+            _draw_response(gain, phase, metrics, response, (color, style))
+        for group, transfer in transfers.items():
+            _draw_points(panels, transfer, colors[group], _marker(group))
+            _draw_lines(gain, phase, metrics, group, colors[group])
+        _frame(panels)
+        arrange(figure, _handles(metrics, transfers, colors), gap_in=0.2)
+    return figure
+
+
+def _marker(group: str) -> str:
+    return _SENSOR if group.startswith("sensors/") else _FILTER
+
+
+def _responses(metrics: RunMetrics, colors: Mapping[str, str]) -> Iterator[tuple[Response, str, Any]]:
+    if metrics.responses is not None:
+        for name, response in metrics.responses.sensors.items():
+            yield response, colors[f"sensors/{name}"], "-"
+        for belief in metrics.responses.beliefs:
+            for name, response in belief.sensors.items():
+                yield response, colors[f"sensors/{name}"], _BELIEVED
+
+
+def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Response, look: tuple[str, Any]) -> None:
+    assert metrics.responses is not None
+    freq = np.array(metrics.responses.frequency_hz)[: len(response.gain)]
+    style: dict[str, Any] = {"color": look[0], "linestyle": look[1], "linewidth": 1.3}
+    gain.plot(freq, response.gain, **style)
+    phase.plot(freq, response.phase_deg, **style)
+
+
+def _draw_points(panels: tuple[Axes, Axes, Axes], transfer: Transfer, color: str, marker: str) -> None:
+    gain, phase, coherence = panels
+    told = transfer.coherence > transfer.chance
+    style: dict[str, Any] = {"color": color, "marker": marker, "linestyle": "none", "markersize": 2.6, "alpha": 0.8}
+    gain.plot(transfer.freq_hz[told], np.abs(transfer.response[told]), **style)
+    phase.plot(transfer.freq_hz[told], np.degrees(np.angle(transfer.response[told])), **style)
+    coherence.plot(transfer.freq_hz, transfer.coherence, **style)
+
+
+def _draw_lines(gain: Axes, phase: Axes, metrics: RunMetrics, group: str, color: str) -> None:
+    lines = [
+        one for one in metrics.sources[group.split("/", 1)[1]].lines or [] if one.gain and one.phase_deg is not None
+    ]
+    style: dict[str, Any] = {
+        "color": color,
+        "marker": _marker(group),
+        "linestyle": "none",
+        "markersize": 6.5,
+        "fillstyle": "none",
+    }
+    gain.plot([one.frequency_hz for one in lines], [one.gain or 0.0 for one in lines], **style)
+    phase.plot([one.frequency_hz for one in lines], [one.phase_deg or 0.0 for one in lines], **style)
+
+
+def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
+    gain, phase, coherence = panels
+    gain.set_xscale("log")
+    gain.set_yscale("log")
+    low, high = gain.get_ylim()
+    gain.set_ylim(max(low, _LEAST), high)
+    decade_axis(gain)
+    phase.set_yticks(range(-180, 181, 90))
+    phase.set_ylim(-190, 190)
+    coherence.set_ylim(-0.04, 1.06)
+    coherence.set_xlabel("frequency [Hz]")
+    for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=True):
+        axes.set_ylabel(words)
+        axes.grid(visible=True)
+    coherence.xaxis.set_major_locator(LogLocator(numticks=20))
+    coherence.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+    coherence.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _handles(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=colors[group], linestyle="none", marker=_marker(group), markersize=5, label=label(group))
+        for group in transfers
+    ]
+    if metrics.responses is not None:
+        handles.append(Line2D([], [], color=INK, linewidth=1.3, label="as built"))
+        if metrics.responses.beliefs:
+            handles.append(Line2D([], [], color=INK, linewidth=1.3, linestyle=_BELIEVED, label="as believed"))
+    return handles

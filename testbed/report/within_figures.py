@@ -1,0 +1,133 @@
+"""The figures of what happened inside the filters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, time_axis
+from testbed.pages.svg import INK, STYLE
+from testbed.report.figures import DASHES, DEG_S, Unit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
+
+    from testbed.pages.envelope import Envelope
+    from testbed.report.within import Correlations
+    from testbed.signals import FloatArray
+
+_NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of"}
+_MARKERS = ("o", "s", "^", "D", "v")
+# More decades than this above the lowest hide what the filter does most of the time.
+_DECADES = 6.0
+
+
+def adapted_figure(
+    traces: Mapping[str, Mapping[str, Envelope]], colors: Mapping[str, str], duration_s: float, unit: Unit = DEG_S
+) -> Figure:
+    """Draw what the filters adapted over time, a panel for each quantity: variances on a logarithmic axis.
+
+    Parameters
+    ----------
+    traces : Mapping
+        By diagnostic and filter, variances in rad^2/s^2.
+    colors : Mapping
+        Group (``fusion/kalman``, ...) to color.
+    duration_s : float
+        Length of the run [s].
+    unit : tuple of str and float, optional
+        Unit of the rates, and what deg/s is multiplied by for it.
+    """
+    filters = list(dict.fromkeys(name for by_filter in traces.values() for name in by_filter))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * len(traces)))
+        panels = figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (key, by_filter) in zip(panels, traces.items(), strict=True):
+            counted = key.startswith("gated_")
+            for i, name in enumerate(filters):
+                if name in by_filter:
+                    scale = 1.0 if counted else (unit[1] * DEGREE) ** 2
+                    draw(axes, by_filter[name], colors[f"fusion/{name}"], 1.6 * 0.8**i, scale=scale)
+            axes.set_title(_title(key), loc="left")
+            axes.set_ylabel("readings" if counted else f"({unit[0]})²")
+            axes.grid(visible=True)
+            if not counted:
+                _logarithmic(axes, by_filter.values(), (unit[1] * DEGREE) ** 2)
+        panels[-1].set_xlim(0.0, duration_s)
+        time_axis(panels[-1], duration_s)
+        arrange(figure, _handles(filters, colors))
+    return figure
+
+
+def _title(key: str) -> str:
+    for stem, words in _NAMES.items():
+        if key.startswith(stem):
+            return f"{words} {label(key.removeprefix(stem))}"
+    return "Q, variance that a step adds to the rate"
+
+
+def _logarithmic(axes: Axes, envelopes: Iterable[Envelope], scale: float) -> None:
+    """Give the axis decades, down to the lowest value above zero but not below what six of them show."""
+    values = scale * np.concatenate([ends for one in envelopes for ends in (one.low, one.high)])
+    known = values[np.isfinite(values) & (values > 0.0)]
+    if known.size:
+        low, high = max(float(known.min()), float(known.max()) * 10.0**-_DECADES), float(known.max())
+        axes.set_yscale("log")
+        axes.set_ylim(low / 1.6, high * 1.6)
+        decade_axis(axes)
+
+
+def _handles(filters: Iterable[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
+    return [Line2D([], [], color=colors[f"fusion/{name}"], linewidth=2.2, label=label(name)) for name in filters]
+
+
+def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Mapping[str, str]) -> Figure:
+    """Draw the correlation of the innovations with those before, a panel for each sensor, with what chance allows.
+
+    Parameters
+    ----------
+    found : Mapping
+        By sensor and filter.
+    colors : Mapping
+        Group (``fusion/kalman``, ...) to color.
+    """
+    filters = list(dict.fromkeys(name for by_filter in found.values() for name in by_filter))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.9 * len(found)))
+        panels = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (sensor, by_filter) in zip(panels, found.items(), strict=True):
+            bound = 1.96 / np.sqrt(min(one.n for one in by_filter.values()))
+            axes.axhspan(-bound, bound, color=INK, alpha=0.13, linewidth=0)
+            axes.axhline(0.0, color=INK, linewidth=0.6)
+            for name, one in by_filter.items():
+                _draw_correlations(axes, one.values, colors[f"fusion/{name}"], filters.index(name))
+            axes.set_title(f"innovations of {label(sensor)}", loc="left")
+            axes.set_ylabel("correlation")
+            axes.grid(visible=True)
+        panels[-1].set_xlabel("lag [readings]")
+        arrange(figure, _style_handles(filters, colors))
+    return figure
+
+
+def _draw_correlations(axes: Axes, values: FloatArray, color: str, turn: int) -> None:
+    axes.plot(np.arange(1, len(values) + 1), values, color=color, linewidth=1.1, markersize=3.2, **_look(turn))
+
+
+def _look(turn: int) -> dict[str, Any]:
+    return {"linestyle": DASHES[turn % len(DASHES)], "marker": _MARKERS[turn % len(_MARKERS)]}
+
+
+def _style_handles(filters: Sequence[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=colors[f"fusion/{name}"], linewidth=1.4, markersize=3.5, label=label(name), **_look(i))
+        for i, name in enumerate(filters)
+    ]
+    handles.append(Line2D([], [], color=INK, alpha=0.3, linewidth=6.0, label="95 % of chance, if white"))
+    return handles
