@@ -87,7 +87,7 @@ def rmse(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
 ) -> float:
     """Return the error of a filter over the second half [deg/s]."""
-    error = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", **own).rate - rate
+    error = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", verdict=False, **own).rate - rate
     return float(np.sqrt(np.mean(error[rate.size // 2 :] ** 2)) / DEG)
 
 
@@ -239,7 +239,12 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
     half, rest = before.size // 2, before.size // 2 + round(AFTER * RATES["mhd_ars"])
     rate = np.concatenate([before[:half], after[half:]])
     errors = [
-        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, start="rest", **own).rate - one)
+        (
+            estimate(
+                "wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, start="rest", verdict=False, **own
+            ).rate
+            - one
+        )
         / DEG
         for one in (rate, after)
     ]

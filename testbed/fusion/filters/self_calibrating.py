@@ -169,7 +169,7 @@ class SelfCalibrating(BlockFilter):
         """About how long a step takes, compiled, on a core of 2020 [s]: that of the filter inside."""
         return self._inner.step_seconds + 2e-8
 
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
         n, at = Z.shape[1], 0
         while at < n:
             if self._filled == 0:
