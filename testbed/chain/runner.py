@@ -93,7 +93,7 @@ def run(
 
 def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress | None) -> Run:
     chain, blocks = simulate(scenario, block)
-    memory, judge = MemoryStore(chain.rates), Judge(scenario, chain.rates, chain.step)
+    memory, judge = MemoryStore(chain.rates, chain.times), Judge(scenario, chain.rates, chain.step)
     for part in blocks:
         memory.write(part)
         judge.write(part)

@@ -57,7 +57,7 @@ def open_sinks(
     sinks: list[Sink] = []
     if "netcdf" in outputs:
         attributes = provenance(scenario.name, scenario.frame.seed, versions())
-        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes)
+        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes, chain.times)
         stack.callback(netcdf.close)
         sinks.append(netcdf)
     if "recording" in outputs:
@@ -74,6 +74,7 @@ def open_sinks(
             model=chain.turntable.model,
             settle=scenario.frame.settle,
             detail=scenario.detail,
+            times_ns=chain.time_ns,
             live=live,
         )
         sinks.append(stack.enter_context(recording))

@@ -69,7 +69,7 @@ class RecordingWriter:
     pose_stride : int
         Base samples between poses and between profiles.
     times_ns : mapping of str to ndarray, shape (n_time,), optional
-        Stamps [ns] of ``base`` and of every sensor, where they are no multiples of one step.
+        Stamps [ns] of sensors, and of ``base``, that are no multiples of one step.
     live : str, optional
         Address of a viewer that shows it while it is written.
 
@@ -265,7 +265,7 @@ class RecordingWriter:
                 width=width,
                 detailed=detailed,
                 gaps=gaps,
-                times_ns=None if self._times is None else self._times[clock_of(key)],
+                times_ns=None if self._times is None else self._times.get(clock_of(key)),
             )
         self._signals[entity].write(values)
 

@@ -15,7 +15,7 @@ def row(name, n_lines):
 
 
 def test_a_row_is_as_high_as_its_legend_needs():
-    """Seven names beside three: 62 points and 19 for each, of what a window of 900 points has."""
+    """Seven names and three, as a run of three filters has them, fit into a window of 900 points."""
     found = _rows([row("a", 7), row("b", 7), row("c", 3), row("d", 3)])
     assert list(found.row_shares) == [FRAME + 7 * ENTRY] * 2 + [FRAME + 3 * ENTRY] * 2
     assert sum(found.row_shares) <= ROOM
