@@ -58,6 +58,7 @@ def blueprint(
     channels: Sequence[str],
     model: mujoco.MjModel | None,
     clock: Clock,
+    marks: Sequence[str] = (),
     live: bool = False,
 ) -> rrb.Blueprint:
     """Return the layout for the signals that the recording has.
@@ -72,6 +73,8 @@ def blueprint(
         The bodies, for the place of the camera; a recording that is replayed has none.
     clock : Clock
         Length of the run and the window recorded sample by sample.
+    marks : sequence of str, optional
+        Paths of the crosses of readings that were struck out.
     live : bool, optional
         Whether the time cursor follows what comes in; else it stands.
     """
@@ -92,11 +95,11 @@ def blueprint(
         (
             "Rates, closer",
             [
-                _plot(f"Rate, {span} [rad/s]", rates, zoom),
-                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
+                _plot(f"Rate, {span} [rad/s]", [*rates, *marks], zoom),
+                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", [*rates, *marks], around),
                 _plot(f"{estimated} [rad/s]", truth_and_filters, (0.0, duration)),
             ],
-            len(rates),
+            len(rates) + len(marks),
         ),
     ]
     views: list[rrb.View | rrb.Container]
