@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.lockstep import Lockstep
-from testbed.chain.pipeline import block_lengths
+from testbed.chain.pipeline import block_lengths, simulate
 from testbed.chain.versions import versions
+from testbed.judging.judge import Judge
 from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
@@ -76,11 +77,22 @@ def evaluate(
 
 def _play(cases: Sequence[Scenario], group: Sequence[int], seeds: Sequence[int]) -> dict[tuple[int, int], RunMetrics]:
     """Return the metrics by number of the case and seed."""
+    if any(sensor.clocked(cases[i].base_rate_hz) for i in group for sensor in cases[i].sensors.values()):
+        return {(i, seed): _alone(cases[i].with_seed(seed)) for i in group for seed in seeds}
     lockstep = Lockstep([cases[i] for i in group], seeds)
     for n_time in block_lengths(cases[group[0]]):
         lockstep.advance(n_time)
     made_by = versions()
     return {(number, seed): lockstep.metrics(i, seed, made_by) for i, number in enumerate(group) for seed in seeds}
+
+
+def _alone(scenario: Scenario) -> RunMetrics:
+    """Return the metrics of a scenario by itself: sensors with clocks of their own share nothing between seeds."""
+    chain, blocks = simulate(scenario)
+    judge = Judge(scenario, chain.rates, chain.step)
+    for block in blocks:
+        judge.write(block)
+    return judge.metrics(versions())
 
 
 def _parts(seeds: Sequence[int], most: int) -> Iterator[list[int]]:

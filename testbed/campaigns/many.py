@@ -44,6 +44,7 @@ class ManySensors:
         sensor = scenario.sensors[name]
         self._stages = {seed: sensor.start(base, seed, name) for seed in seeds}
         self._faults = {seed: sensor.start_faults() for seed in seeds}
+        self._losses = {seed: sensor.start_losses(seed, name) for seed in seeds}
         self._watch = None
         if scenario.sensor_types[name] not in SENSORS:
             self._watch = {seed: CheckedSensor(name, round(base / sensor.sample_rate)) for seed in seeds}
@@ -68,7 +69,7 @@ class ManySensors:
         seeds : sequence of int
             Some of those given at the start.
         """
-        return [self._faults[seed].process(self._reading(seed)) for seed in seeds]
+        return [self._losses[seed].process(self._faults[seed].process(self._reading(seed))) for seed in seeds]
 
     def _reading(self, seed: int) -> FloatArray:
         if self._split:

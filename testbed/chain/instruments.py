@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.chain.logger import Logger
 from testbed.chain.onset import LateFilter, Onset
 from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import POSE_STRIDE
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
     WatchedFilter = CheckedFilter | LateFilter
-    Estimation = Callable[[Mapping[str, FloatArray]], EstimateBlock]
+    Estimation = Callable[..., EstimateBlock]
 
 
 class Instruments:
@@ -49,6 +50,10 @@ class Instruments:
             for name, sensor in scenario.sensors.items()
         }
         self._faults = {name: sensor.start_faults() for name, sensor in scenario.sensors.items()}
+        self._losses = {
+            name: sensor.start_losses(scenario.frame.seed, name) for name, sensor in scenario.sensors.items()
+        }
+        self._logger = Logger(scenario)
         self._foreign = {
             name: CheckedSensor(name, round(self.rates["base"] / sensor.sample_rate))
             for name, sensor in scenario.sensors.items()
@@ -77,7 +82,9 @@ class Instruments:
             readings[name], profile = self._sensed(name, truth)
             if profile is not None:
                 profiles[name] = profile
-        estimates = {name: way(stage)(readings) for name, stage in self._fusion.items()}
+        ticked = self._logger.ticked(truth)
+        seen = self._logger.seen(readings, ticked, truth)
+        estimates = {name: way(stage)(*seen) for name, stage in self._fusion.items()}
         thermal = {name: stage for name, stage in self._sensors.items() if isinstance(stage, ThermalStage)}
         rates = {name: estimate.rate for name, estimate in estimates.items()}
         return RunBlock(
@@ -90,6 +97,7 @@ class Instruments:
             temperatures={name: stage.temperature for name, stage in thermal.items()},
             drifts={name: stage.drift for name, stage in thermal.items()},
             pointing=self._pointing.process(truth.rate, truth.sensor_rate, readings, rates),
+            ticked=ticked,
         )
 
     def _sensed(self, name: str, truth: TruthBlock) -> tuple[FloatArray, tuple[FloatArray, FloatArray] | None]:
@@ -101,7 +109,7 @@ class Instruments:
 
         rate = truth.sensor_rate[name]
         readings, profile = self._foreign[name].sense(feed, rate) if name in self._foreign else feed(rate)
-        return self._faults[name].process(readings), profile
+        return self._losses[name].process(self._faults[name].process(readings)), profile
 
 
 def sample_rates(scenario: Scenario) -> dict[str, float]:

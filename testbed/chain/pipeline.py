@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from testbed.chain.instruments import Instruments
+from testbed.chain.logger import whole_stamps
 from testbed.chain.truth import Truth
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from testbed.runs.block import RunBlock
     from testbed.scenario.model import Scenario
+    from testbed.signals import FloatArray
 
 
 class Chain:
@@ -25,7 +32,7 @@ class Chain:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self._truth = Truth(scenario)
+        self._scenario, self._truth = scenario, Truth(scenario)
         self._instruments = Instruments(scenario)
         self.step, self.turntable, self.rates = self._truth.step, self._truth.turntable, self._instruments.rates
 
@@ -36,6 +43,16 @@ class Chain:
     def tried(self, n_time: int) -> RunBlock:
         """Advance a trial by `n_time` base samples, in which shipped filters stay undefined (`CheckedFilter.tried`)."""
         return self._instruments.tried(*self._truth.process(n_time))
+
+    @cached_property
+    def time_ns(self) -> dict[str, NDArray[np.int64]]:
+        """What the logger writes for the readings of each sensor with a clock of its own, over the whole run [ns]."""
+        return whole_stamps(self._scenario)
+
+    @property
+    def times(self) -> dict[str, FloatArray]:
+        """The same in seconds."""
+        return {name: np.asarray(stamps * 1e-9, float) for name, stamps in self.time_ns.items()}
 
     @property
     def untried_seconds(self) -> float:

@@ -35,6 +35,7 @@ def run(
     outputs: Iterable[str] | None = None,
     block: float | None = None,
     progress: Progress | None = None,
+    live: str | None = None,
 ) -> Run:
     """Run a scenario.
 
@@ -55,6 +56,9 @@ def run(
         Length of a block [s], 20 000 samples of the base clock if not given; the signals do not depend on it.
     progress : callable, optional
         Called after every block with the simulated time [s].
+    live : str, optional
+        Address of a Rerun viewer, such as ``rerun+http://127.0.0.1:9876/proxy``, that shows the recording while it is
+        written.
 
     Returns
     -------
@@ -84,12 +88,12 @@ def run(
             msg = "outputs: expected only beside out, the folder that they go to"
             raise ValueError(msg)
         return _run_in_memory(loaded, block, progress)
-    return _run_to_folder(loaded, Path(out), chosen(outputs), block, progress)
+    return _run_to_folder(loaded, Path(out), chosen(outputs), block, progress, live)
 
 
 def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress | None) -> Run:
     chain, blocks = simulate(scenario, block)
-    memory, judge = MemoryStore(chain.rates), Judge(scenario, chain.rates, chain.step)
+    memory, judge = MemoryStore(chain.rates, chain.times), Judge(scenario, chain.rates, chain.step)
     for part in blocks:
         memory.write(part)
         judge.write(part)
@@ -99,7 +103,12 @@ def _run_in_memory(scenario: Scenario, block: float | None, progress: Progress |
 
 
 def _run_to_folder(
-    scenario: Scenario, out: Path, outputs: tuple[str, ...], block: float | None, progress: Progress | None
+    scenario: Scenario,
+    out: Path,
+    outputs: tuple[str, ...],
+    block: float | None,
+    progress: Progress | None,
+    live: str | None,
 ) -> Run:
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder(out))
@@ -108,7 +117,7 @@ def _run_to_folder(
         scenario = scenario.kept_in(folder.path)
         chain, blocks = simulate(scenario, block)
         judge = Judge(scenario, chain.rates, chain.step)
-        sinks = open_sinks(stack, folder.path, scenario, chain, outputs)
+        sinks = open_sinks(stack, folder.path, scenario, chain, outputs, live)
         for part in blocks:
             if not part.start:
                 needed = disk_bytes(part, chain.rates, scenario.n_time, scenario.detail, outputs)

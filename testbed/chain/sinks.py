@@ -29,7 +29,14 @@ class Sink(Protocol):
         """Finish the file; a second time nothing happens."""
 
 
-def open_sinks(stack: ExitStack, folder: Path, scenario: Scenario, chain: Chain, outputs: Sequence[str]) -> list[Sink]:
+def open_sinks(
+    stack: ExitStack,
+    folder: Path,
+    scenario: Scenario,
+    chain: Chain,
+    outputs: Sequence[str],
+    live: str | None = None,
+) -> list[Sink]:
     """Return the files of a run that its blocks go to; they are closed with the stack, if not before.
 
     Parameters
@@ -44,11 +51,13 @@ def open_sinks(stack: ExitStack, folder: Path, scenario: Scenario, chain: Chain,
         Which runs it.
     outputs : sequence of str
         What is wanted, of `testbed.runs.outputs.OUTPUTS`.
+    live : str, optional
+        Address of a viewer that shows the recording while it is written.
     """
     sinks: list[Sink] = []
     if "netcdf" in outputs:
         attributes = provenance(scenario.name, scenario.frame.seed, versions())
-        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes)
+        netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes, chain.times)
         stack.callback(netcdf.close)
         sinks.append(netcdf)
     if "recording" in outputs:
@@ -65,6 +74,8 @@ def open_sinks(stack: ExitStack, folder: Path, scenario: Scenario, chain: Chain,
             model=chain.turntable.model,
             settle=scenario.frame.settle,
             detail=scenario.detail,
+            times_ns=chain.time_ns,
+            live=live,
         )
         sinks.append(stack.enter_context(recording))
     return sinks

@@ -106,12 +106,16 @@ def _print_claims(console: Console, fusion: Mapping[str, SourceMetrics]) -> None
     """Print the verdict on each filter's claims about itself."""
     claims = {name: source.consistency for name, source in fusion.items() if source.consistency is not None}
     words = [
-        f"{name} {claim.verdict} (NEES {number(claim.nees)})"
+        f"{name} {claim.verdict}" + ("" if claim.nees is None else f" (NEES {number(claim.nees)})")
         for name, claim in claims.items()
         if claim.verdict is not None
     ]
     if words:
-        meaning = "NEES: mean of error squared over the variance that the filter claims, 1 if the claim holds"
+        meaning = (
+            "by the innovations alone, since there is no reference"
+            if all(claim.nees is None for claim in claims.values())
+            else "NEES: mean of error squared over the variance that the filter claims, 1 if the claim holds"
+        )
         console.print(f"claims: {', '.join(words)}; {meaning}", soft_wrap=True)
 
 

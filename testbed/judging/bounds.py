@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.fusion.analysis.bounds import never_settles, run_bounds, settled_bounds
-from testbed.fusion.schedule import common_clock, long_cycle
+from testbed.fusion.schedule import even_rates, long_cycle, nearest_clock, odd_sensor
 from testbed.metrics.errors import floor_rmse
 from testbed.scenario.beliefs import believed
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     Density = Callable[[FloatArray], FloatArray]
 
+# Clocks within this of a whole ratio have its bounds.
+_NEARLY_WHOLE = 0.01
 # A sensor that is blind at zero falls by ten from the first to the second.
 _NEAR_ZERO_HZ = np.array([1e-5, 1e-6])
 
@@ -39,6 +41,8 @@ class Bounds:
 
     def __init__(self, sensors: Mapping[str, Sensor], sample_rate_hz: Mapping[str, float]) -> None:
         self._sensors, self._rates = sensors, {name: sample_rate_hz[name] for name in sensors}
+        # Of clocks that have nearly a whole ratio, the bounds are those of the whole one.
+        self._even = even_rates(self._rates) if sensors and odd_sensor(self._rates) else self._rates
 
     @property
     def densities(self) -> dict[str, Density]:
@@ -88,7 +92,7 @@ class Bounds:
         belief, why = self._exact()
         if belief is None or (why := never_settles(belief)):
             return None, why
-        return settled_bounds(belief, self._rates, signals), None
+        return settled_bounds(belief, self._even, signals), None
 
     def of_run(
         self, signals: Sequence[Sequence[tuple[float, float]]], start: StartKind, window: tuple[float, float]
@@ -108,12 +112,14 @@ class Bounds:
         return (
             (None, why)
             if belief is None
-            else (run_bounds(belief, self._rates, signals, start=start, window=window), None)
+            else (run_bounds(belief, self._even, signals, start=start, window=window), None)
         )
 
     def _exact(self) -> tuple[dict[str, SensorBelief] | None, str | None]:
-        if reason := self.reason or long_cycle(common_clock(self._rates)[1]):
+        if reason := self.reason or long_cycle(nearest_clock(self._rates)[1]):
             return None, reason
+        if odd := odd_sensor(self._rates, _NEARLY_WHOLE):
+            return None, f"the clock of {odd} has no ratio to the fastest that is nearly whole"
         found = {name: believed(sensor) for name, sensor in self._sensors.items()}
         known = {name: one for name, one in found.items() if one is not None and one.output_noise > 0.0}
         missing = [name for name in found if name not in known]

@@ -47,7 +47,9 @@ class CaseFacts:
         self.scenario, self.rates = scenario, rates
         self._table = TableMetrics(scenario, step)
         self._bounds = Bounds(scenario.sensors, rates)
-        self.waves = {rate: Waves(scenario.lines) for rate in {rates[name] for name in self.sources}}
+        self.ticking = {name for name, one in scenario.sensors.items() if one.clocked(rates["base"])}
+        regular = {rates[name] for name in self.sources if name not in self.ticking}
+        self.waves = {rate: Waves(scenario.lines) for rate in regular}
         self._clocks: dict[float, tuple[int, FloatArray, FloatArray]] = {}
         self._optima: dict[tuple[Lines, StartKind], list[float | None] | None] = {}
         self._settled: dict[Lines, tuple[float | None, str | None]] = {}

@@ -16,7 +16,7 @@ from testbed.runs.metrics import RunMetrics
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from testbed.runs.block import RunBlock
+    from testbed.runs.block import RunBlock, Ticked
     from testbed.scenario.model import Scenario
     from testbed.scenario.step_choice import StepChoice
     from testbed.signals import FloatArray
@@ -48,6 +48,13 @@ class Judge:
         self._errors = {
             name: ErrorMetrics(waves[rates[name]], gaps=name in scenario.sensors, span=span)
             for name in self._case.sources
+            if name not in self._case.ticking
+        }
+        # Their times are their own.
+        self._errors |= {
+            name: ErrorMetrics(scenario.lines, gaps=True, span=span)
+            for name in scenario.sensors
+            if name not in self._errors
         }
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
@@ -58,7 +65,10 @@ class Judge:
         if not self._shares:
             self._case.write(block)
         for name, readings in block.sensors.items():
-            self._add(name, readings, None)
+            if name in block.ticked:
+                self._add_ticked(name, readings, block.ticked[name])
+            else:
+                self._add(name, readings, None)
         for name, estimate in block.fusion.items():
             error, settled = self._add(name, estimate.rate, estimate.std)
             self._gated.setdefault(name, {}).update(_gated(estimate.diagnostics))
@@ -73,6 +83,11 @@ class Judge:
         settled, t, truth = self._case.clock(name)
         self._errors[name].add(t, rate[settled:], truth, None if std is None else std[settled:])
         return rate[settled:] - truth, settled
+
+    def _add_ticked(self, name: str, rate: FloatArray, ticked: Ticked) -> None:
+        """Add a block of readings of a sensor with a clock of its own."""
+        first = int(np.searchsorted(ticked.times, self._scenario.frame.settle))
+        self._errors[name].add(ticked.times[first:], rate[first:], ticked.truth[first:])
 
     def metrics(self, versions: Mapping[str, str] | None = None) -> RunMetrics:
         """Return the metrics of what was written.

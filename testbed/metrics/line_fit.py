@@ -12,6 +12,8 @@ from scipy.stats import t as student
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from testbed.signals import FloatArray
 
 # Parts of the record of which sums are kept: as many phases as the offsets below need, to 2 % of their amplitude.
@@ -65,6 +67,8 @@ class Waves:
         self.lines = tuple(lines)
         self._t: FloatArray | None = None
         self._basis = np.empty((0, 0))
+        self._span: tuple[float, float] | None = None
+        self._pieces: list[Piece] | None = None
 
     def at(self, t: FloatArray) -> FloatArray:
         """Return cos and sin of each line [-], shape (2 n_line, n_time), those of the last call if it was for the same
@@ -78,8 +82,58 @@ class Waves:
         if t is not self._t:
             turns = [2.0 * np.pi * line * t for line in self.lines]
             self._basis = np.array([f(turn) for turn in turns for f in (np.cos, np.sin)])
-            self._t = t
+            self._t, self._pieces = t, None
         return self._basis
+
+    def pieces(self, t: FloatArray, span: tuple[float, float] | None) -> list[Piece]:
+        """Return the pieces of a block, each in one part of the record; those of the last call if it was for the same.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n_time,)
+            As for `at`.
+        span : tuple of two floats, optional
+            From when to when the record lasts [s]; without it all is one part.
+        """
+        basis = self.at(t)
+        if self._pieces is None or span != self._span:
+            self._span = span
+            parts = _part_of(t, span)
+            cuts = [0, *(np.flatnonzero(np.diff(parts)) + 1), t.size]
+            self._pieces = [
+                Piece(int(parts[a]), slice(a, b), basis[:, a:b], basis[:, a:b] @ basis[:, a:b].T)
+                for a, b in itertools.pairwise(cuts)
+            ]
+        return self._pieces
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Samples of a block in one part of the record.
+
+    Parameters
+    ----------
+    part : int
+        Number of the part.
+    samples : slice
+        Which.
+    basis : ndarray, shape (2 n_line, n_sample)
+        Cosine and sine of the lines [-].
+    gram : ndarray, shape (2 n_line, 2 n_line)
+        Their products, summed [-].
+    """
+
+    part: int
+    samples: slice
+    basis: FloatArray
+    gram: FloatArray
+
+
+def _part_of(t: FloatArray, span: tuple[float, float] | None) -> NDArray[np.int64]:
+    if span is None:
+        return np.zeros(t.size, dtype=np.int64)
+    start, stop = span
+    return np.clip(((t - start) / (stop - start) * _PARTS).astype(np.int64), 0, _PARTS - 1)
 
 
 class LineFit:
@@ -129,14 +183,10 @@ class LineFit:
         if not self.lines:
             return
         self._n += t.size
-        basis = self._waves.at(t)
-        self._with_truth += basis @ truth
-        parts = self._part_of(t)
-        cuts = [0, *(np.flatnonzero(np.diff(parts)) + 1), t.size]
-        for start, stop in itertools.pairwise(cuts):
-            piece = basis[:, start:stop]
-            self._gram[parts[start]] += piece @ piece.T
-            self._with_error[parts[start]] += piece @ error[start:stop]
+        self._with_truth += self._waves.at(t) @ truth
+        for piece in self._waves.pieces(t, self._span):
+            self._gram[piece.part] += piece.gram
+            self._with_error[piece.part] += piece.basis @ error[piece.samples]
 
     def result(self) -> list[Line]:
         """Return what became of each line."""
@@ -160,12 +210,6 @@ class LineFit:
         gram, projection = self._gram.sum(axis=0), self._with_error.sum(axis=0)
         fit = np.linalg.lstsq(gram, projection, rcond=None)[0]
         return float(2.0 * fit @ projection - fit @ gram @ fit)
-
-    def _part_of(self, t: FloatArray) -> FloatArray:
-        if self._span is None:
-            return np.zeros(t.size, dtype=np.int64)
-        start, stop = self._span
-        return np.clip(((t - start) / (stop - start) * _PARTS).astype(np.int64), 0, _PARTS - 1)
 
     def _half_widths(self, fit: FloatArray) -> list[float | None]:
         """Return the half width of the 95 % interval of each phasor of the error [rad/s]."""

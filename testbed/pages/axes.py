@@ -49,7 +49,8 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
         ncols=-(-len(handles) // n_rows),
         borderaxespad=0.0,
     )
-    rows = len(figure.axes)
+    place = figure.axes[0].get_subplotspec()
+    rows = len(figure.axes) if place is None else place.get_gridspec().nrows
     each = (top - 0.3 - 0.48) / rows
     figure.subplots_adjust(
         left=0.82 / width,

@@ -18,6 +18,7 @@ from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
 from testbed.logs.reader import is_map
 from testbed.notebook import Run, open_run
+from testbed.playback.cross import sensor_agreement
 from testbed.playback.description import description
 from testbed.playback.filters import filter_specs
 from testbed.playback.judge import ReplayJudge
@@ -199,6 +200,12 @@ def prepare(
     source = open_source([log] if isinstance(log, str | Path) else log, map)
     names, file = _asked(filters)
     specs = filter_specs(source.sensors, names, fusion if file is None else file, belief, start, loaded)
+    both = [name for name in specs if name in source.sensors]
+    if both:
+        message = (
+            f"is the name of a sensor too: give the filter another one, such as 'mine: {{type: {specs[both[0]].type}}}'"
+        )
+        raise ScenarioError([Problem(message, f"fusion.{both[0]}")])
     reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, fix=fix)
     reference = None if source.reference is None else wind(source.reference, middle=True)
     lineup = line_up(reels, reference, source.log)
@@ -283,6 +290,7 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
             "replay": made.facts,
             "findings": [finding_entry(one) for one in made.verdict.findings],
             "undecided": list(made.verdict.undecided),
+            "cross": sensor_agreement(lineup, next(iter(made.specs.values())).belief, made.settle),
             "versions": versions(),
         }
     )

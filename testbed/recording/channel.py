@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import mix, rgb
-from testbed.recording.stream import FRAMES, Batch
+from testbed.recording.stream import FRAMES
 from testbed.recording.world import INK, nice_ceiling
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Channel:
         self.entity = f"/sensors/{sensor}/channel"
         self._recording, self._heights, self._color = recording, heights, color
         self._largest = 0.0
-        self._batch = Batch(self._send, FRAMES)
+        self._batch = recording.batch(self._send, FRAMES)
         wanted = np.array(FRACTIONS) * heights.max()
         self.probes = np.abs(heights[:, np.newaxis] - wanted).argmin(axis=0)
         names = [f"u(h = {heights[node] * 1e3:.2f} mm) [rad/s]" for node in self.probes]

@@ -25,7 +25,15 @@ ZOOM = 0.05  # s on each side of the time cursor
 SHOWN = 0.5  # s of the window recorded sample by sample
 FEWEST = 1000  # samples in both, at the least
 LEGEND = 0.25  # room for the legend, as a share of the span
+LOG = "log10_"
+# Points of the screen: what plots share in a window of 900, what a plot needs beside its legend, and a name in that.
+ROOM, FRAME, ENTRY = 834, 88, 23
 DIAGNOSTICS = {  # prefix of the name: quantity and unit
+    # The viewer has no logarithmic axis: what spans decades is recorded as its logarithm too.
+    f"{LOG}R_": ("Adapted R", "log10 of (rad/s)²"),
+    f"{LOG}N_": ("Noise statistic N", "log10 of (rad/s)²"),
+    f"{LOG}Q_": ("Process noise Q", "log10 of (rad/s)²"),
+    "gated_": ("Gated readings", "counted"),
     "R_": ("Adapted R", "(rad/s)²"),
     "N_": ("Noise statistic N", "(rad/s)²"),
     "band_": ("Band: 0 low, 1 mid, 2 high", "-"),
@@ -38,6 +46,10 @@ DIAGNOSTICS = {  # prefix of the name: quantity and unit
 }
 
 
+# What a row of plots is about, its views, which are tabs, and how many lines the first of them names.
+Row = tuple[str, "list[rrb.View | rrb.Container]", int]
+
+
 def blueprint(
     *,
     entities: Sequence[str],
@@ -46,6 +58,8 @@ def blueprint(
     channels: Sequence[str],
     model: mujoco.MjModel | None,
     clock: Clock,
+    marks: Sequence[str] = (),
+    live: bool = False,
 ) -> rrb.Blueprint:
     """Return the layout for the signals that the recording has.
 
@@ -59,11 +73,16 @@ def blueprint(
         The bodies, for the place of the camera; a recording that is replayed has none.
     clock : Clock
         Length of the run and the window recorded sample by sample.
+    marks : sequence of str, optional
+        Paths of the crosses of readings that were struck out.
+    live : bool, optional
+        Whether the time cursor follows what comes in; else it stands.
     """
     window, duration = clock.detail, clock.n_time / clock.sample_rate_hz
     rates = ["/commanded/rate", *(f"/sensors/{n}/rate" for n in sensors), "/truth/rate"]
     rates = [rate for rate in rates if rate in entities] + [f"/fusion/{n}/rate" for n in filters]
     truth_and_filters = [rate for rate in rates if rate.startswith(("/truth", "/fusion"))]
+    estimated = "Truth and estimates" if "/truth/rate" in rates else "Estimates"
     least = FEWEST / clock.sample_rate_hz
     zoom, around = (window[0], min(window[0] + max(SHOWN, least), duration)), max(ZOOM, 0.5 * least)
     span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
@@ -71,74 +90,82 @@ def blueprint(
     if channels:
         probes = [(f"At three heights, {n} [rad/s]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
         left.append(_tabs([*map(_profile, channels), *(_plot(*probe, zoom) for probe in probes)]))
-    right: list[rrb.View | rrb.Container] = [
-        _plot("Rate, whole run [rad/s]", rates, (0.0, duration)),
-        _tabs(
+    right: list[Row] = [
+        ("Rates", [_plot("Rate, whole run [rad/s]", rates, (0.0, duration))], len(rates)),
+        (
+            "Rates, closer",
             [
-                _plot(f"Rate, {span} [rad/s]", rates, zoom),
-                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
-                _plot("Truth and estimates [rad/s]", truth_and_filters, (0.0, duration)),
-            ]
+                _plot(f"Rate, {span} [rad/s]", [*rates, *marks], zoom),
+                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", [*rates, *marks], around),
+                _plot(f"{estimated} [rad/s]", truth_and_filters, (0.0, duration)),
+            ],
+            len(rates) + len(marks),
         ),
     ]
+    views: list[rrb.View | rrb.Container]
     errors = [entity for entity in entities if entity.endswith("/error") and entity.startswith("/fusion/")]
     if errors:
-        right.append(
-            _tabs(
-                [
-                    _plot(f"Error = estimate − truth, {span} [rad/s]", errors, zoom),
-                    _plot(f"Error from {window[0]:g} s on [rad/s]", errors, (window[0], duration)),
-                    _plot("Error, whole run [rad/s]", errors, (0.0, duration)),
-                ]
-            )
-        )
+        views = [
+            _plot(f"Error = estimate − truth, {span} [rad/s]", errors, zoom),
+            _plot(f"Error from {window[0]:g} s on [rad/s]", errors, (window[0], duration)),
+            _plot("Error, whole run [rad/s]", errors, (0.0, duration)),
+        ]
+        right.append(("Errors", views, len(errors)))
     if sights := [entity for entity in entities if entity.startswith("/pointing/")]:
         left.append(_target())
-        right.append(
-            _tabs(
-                [
-                    _plot(f"Pointing error, {span} [µrad]", sights, zoom),
-                    _plot(f"Pointing error from {window[0]:g} s on [µrad]", sights, (window[0], duration)),
-                ]
-            )
-        )
+        views = [
+            _plot(f"Pointing error, {span} [µrad]", sights, zoom),
+            _plot(f"Pointing error from {window[0]:g} s on [µrad]", sights, (window[0], duration)),
+        ]
+        right.append(("Pointing", views, len(sights)))
     thermometers = [entity for entity in entities if entity.endswith("/temperature")]
     if thermometers:
         drifts = [entity for entity in entities if entity.endswith("/drift")]
-        right.append(
-            _tabs(
-                [
-                    _plot("Temperature inside [K]", thermometers, (0.0, duration)),
-                    _plot("True thermal drift [rad/s]", drifts, (0.0, duration)),
-                ]
-            )
-        )
-    if diagnostics := _diagnostics(entities, sensors, duration):
-        right.append(_tabs(diagnostics))
+        views = [
+            _plot("Temperature inside [K]", thermometers, (0.0, duration)),
+            _plot("True thermal drift [rad/s]", drifts, (0.0, duration)),
+        ]
+        right.append(("Temperature", views, len(thermometers)))
+    if diagnostics := _diagnostics(entities, sensors):
+        views = [_beside(kind, by_sensor, duration) for kind, by_sensor in diagnostics.items()]
+        # Plots beside each other have titles of their own below the tabs'.
+        n_lines = 1 + max(map(len, next(iter(diagnostics.values())).values()))
+        right.append(("Inside the filters", views, n_lines))
     shares = {"row_shares": [3, 2, 2][: len(left)]} if len(left) > 1 else {}
-    plots = rrb.Vertical(*right, row_shares=[5, 6, 4, 4, 4, 4][: len(right)])
+    plots = _rows(right)
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Vertical(*left, **shares), plots, column_shares=[2, 3]) if left else plots,
-        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed"),
+        rrb.TimePanel(timeline=TIMELINE, play_state="following" if live else "paused", state="collapsed"),
         collapse_panels=True,
         auto_layout=False,
         auto_views=False,
     )
 
 
-def _tabs(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
-    return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
+def _rows(rows: Sequence[Row]) -> rrb.Container:
+    """Put the rows under each other, as high as their legends need; where the window is too low for all, the topics
+    behind the rates are tabs of one row.
+    """
+    needs = [FRAME + ENTRY * max(n_lines, 3) for _, _, n_lines in rows]
+    if sum(needs) <= ROOM or len(rows) < 4:
+        return rrb.Vertical(*(_tabs(views) for _, views, _ in rows), row_shares=needs)
+    topics = rrb.Tabs(*(_tabs(views, name) for name, views, _ in rows[2:]), active_tab=0)
+    return rrb.Vertical(*(_tabs(views) for _, views, _ in rows[:2]), topics, row_shares=[*needs[:2], max(needs[2:])])
+
+
+def _tabs(views: Sequence[rrb.View | rrb.Container], name: str | None = None) -> rrb.View | rrb.Container:
+    return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0, name=name)
 
 
 def _absolute(seconds: float) -> rrb.TimeRangeBoundary:
     return rrb.TimeRangeBoundary.absolute(seconds=seconds)
 
 
-def _plot(name: str, contents: Iterable[str], span: tuple[float, float]) -> rrb.TimeSeriesView:
+def _plot(name: str, contents: Iterable[str], span: tuple[float, float], legend: float = LEGEND) -> rrb.TimeSeriesView:
     data = rr.TimeRange(start=_absolute(span[0]), end=_absolute(span[1]))
     # The legend stands in an empty margin, not on the curves.
     length = span[1] - span[0]
-    shown = rr.TimeRange(start=_absolute(span[0] - LEGEND * length), end=_absolute(span[1] + 0.02 * length))
+    shown = rr.TimeRange(start=_absolute(span[0] - legend * length), end=_absolute(span[1] + 0.02 * length))
     return _series(name, contents, data, shown)
 
 
@@ -164,8 +191,10 @@ def _series(name: str, contents: Iterable[str], data: rr.TimeRange, shown: rr.Ti
     )
 
 
-def _diagnostics(entities: Sequence[str], sensors: Sequence[str], duration: float) -> list[rrb.View | rrb.Container]:
-    """One tab per quantity, in it one plot per sensor, for the sensors differ by orders of magnitude."""
+def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+    """Return by quantity, which is a tab, and sensor the entities of a plot, for sensors differ by orders of magnitude;
+    what is there as its logarithm is seen as that.
+    """
     groups: dict[str, dict[str, list[str]]] = {kind: {} for kind in DIAGNOSTICS}
     for entity in entities:
         top, _, name, *_ = [*entity.split("/")[1:], ""]
@@ -174,14 +203,14 @@ def _diagnostics(entities: Sequence[str], sensors: Sequence[str], duration: floa
             kind = max((kind for kind in DIAGNOSTICS if name.startswith(kind)), key=len)
             of = name.removeprefix(kind)
             groups[kind].setdefault(of if of in sensors or not kind else "", []).append(entity)
-    return [_beside(kind, by_sensor, duration) for kind, by_sensor in groups.items() if by_sensor]
+    return {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
 
 
 def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float) -> rrb.View | rrb.Container:
     quantity, unit = DIAGNOSTICS[kind]
     suffix = f" [{unit}]" if unit else ""
     plots = [
-        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration))
+        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration), LEGEND * len(contents_of))
         for of, contents in contents_of.items()
     ]
     return plots[0] if len(plots) == 1 else rrb.Horizontal(*plots, name=quantity + suffix)

@@ -64,8 +64,12 @@ class Clock:
 class Recording:
     """A Rerun stream with the run's clock; every call is strict, so nothing is dropped with a warning."""
 
-    def __init__(self, stream: rr.RecordingStream, clock: Clock) -> None:
-        self.stream, self.clock = stream, clock
+    def __init__(self, stream: rr.RecordingStream, clock: Clock, *, live: bool = False) -> None:
+        self.stream, self.clock, self._live = stream, clock, live
+
+    def batch(self, send: Callable[..., None], size: int) -> Batch:
+        """Return what holds rows back until there are `size` of them; if somebody looks on, nothing is held back."""
+        return Batch(send, 1 if self._live else size)
 
     def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what does not change in time."""
@@ -163,7 +167,7 @@ class Signal:
             if times_ns is None
             else clock.chooser_of(times_ns, detailed=detailed, gaps=gaps)
         )
-        self._batch = Batch(self._send, ROWS)
+        self._batch = recording.batch(self._send, ROWS)
         recording.lines(entity, [name], [color], width)
 
     def write(self, values: FloatArray) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import rgb
-from testbed.recording.stream import FRAMES, Batch
+from testbed.recording.stream import FRAMES
 from testbed.recording.world import INK, nice_ceiling
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Target:
 
     def __init__(self, recording: Recording, colors: dict[str, str]) -> None:
         self._recording, self._colors, self._largest = recording, colors, 0.0
-        self._batches = {name: Batch(self._sender(name), FRAMES) for name in colors}
+        self._batches = {name: recording.batch(self._sender(name), FRAMES) for name in colors}
 
     def write(self, name: str, index: NDArray[np.int64], residual: FloatArray) -> None:
         """Add the spot of a filter at the base samples `index`.

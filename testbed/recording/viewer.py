@@ -48,14 +48,43 @@ def open_viewer(run_dir: Path) -> int:
         If the folder has no recording or the machine no display.
     """
     recording = _recording_of(run_dir)
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        msg = (
-            f"{recording}: expected a display to show it on (DISPLAY and WAYLAND_DISPLAY are unset); "
-            "copy the file to a machine that has one and run `rerun recording.rrd` there"
-        )
-        raise RunError(msg)
+    _require_display(str(recording), "copy the file to a machine that has one and run `rerun recording.rrd` there")
     with _process([str(recording), "--new", "--bind", "127.0.0.1"], None) as viewer:
         return viewer.wait()
+
+
+@contextlib.contextmanager
+def live_window() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Open an empty window and yield its address, to which a recording may be sent, and its process.
+
+    It listens on the loopback interface only and sends no usage data.
+
+    Raises
+    ------
+    RunError
+        If the machine has no display, or the viewer does not start.
+    """
+    _require_display("--live", "run without it, and look at the recording on a machine that has one")
+    port = _free_port()
+    with _process(["--bind", "127.0.0.1", "--port", str(port)], None) as viewer:
+        deadline = time.monotonic() + START_TIMEOUT
+        while not _listens(port):
+            if viewer.poll() is not None or time.monotonic() > deadline:
+                msg = f"--live: the viewer's window did not open (status {viewer.poll()})"
+                raise RunError(msg)
+            time.sleep(0.05)
+        yield f"rerun+http://127.0.0.1:{port}/proxy", viewer
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def _require_display(subject: str, remedy: str) -> None:
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        msg = f"{subject}: expected a display to show it on (DISPLAY and WAYLAND_DISPLAY are unset); {remedy}"
+        raise RunError(msg)
 
 
 def screenshot(

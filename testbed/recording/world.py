@@ -73,7 +73,7 @@ class World:
         """
         for body, (position, quaternion) in poses.items():
             if body not in self._bodies:
-                self._bodies[body] = Batch(partial(self._send, body), FRAMES)
+                self._bodies[body] = self._recording.batch(partial(self._send, body), FRAMES)
             self._bodies[body].add(index, position, quaternion)
         self._index.append(index)
         # A copy: a view would keep the whole block alive.

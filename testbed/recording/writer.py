@@ -16,7 +16,8 @@ from rerun.chunk import RrdReader
 from testbed.errors import RunError
 from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
-from testbed.recording.layout import blueprint
+from testbed.recording.layout import LOG, blueprint
+from testbed.recording.marks import PREFIX, GateMarks
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
@@ -69,7 +70,9 @@ class RecordingWriter:
     pose_stride : int
         Base samples between poses and between profiles.
     times_ns : mapping of str to ndarray, shape (n_time,), optional
-        Stamps [ns] of ``base`` and of every sensor, where they are no multiples of one step.
+        Stamps [ns] of sensors, and of ``base``, that are no multiples of one step.
+    live : str, optional
+        Address of a viewer that shows it while it is written.
 
     Raises
     ------
@@ -91,8 +94,9 @@ class RecordingWriter:
         detail: tuple[float, float] | None = None,
         pose_stride: int = 400,
         times_ns: Mapping[str, NDArray[np.int64]] | None = None,
+        live: str | None = None,
     ) -> None:
-        self._path = Path(path)
+        self._path, self._live = Path(path), live
         self._model, self._pose_stride, self._times = model, pose_stride, times_ns
         self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
         self._fusion_names = list(fusion_names)
@@ -100,17 +104,23 @@ class RecordingWriter:
         self._colors = series_colors(list(sensor_rates), self._fusion_names)
         self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
         try:
-            self._stream.save(self._path)
+            if live is None:
+                self._stream.save(self._path)
+            else:
+                self._stream.set_sinks(rr.GrpcSink(live), rr.FileSink(self._path))
         except RuntimeError as error:
             raise self._failure(str(error)) from error
         self._stream.send_recording_name(scenario_name)
-        self._recording = Recording(self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)))
+        self._recording = Recording(
+            self._stream, Clock(sample_rate_hz, n_time, detail or (settle, settle + 2.0)), live=live is not None
+        )
         self._signals: dict[str, Signal] = {}
         bodies = {name: self._colors[f"sensors/{name}"] for name in sensor_rates}
         self._world = None if model is None else World(self._recording, model, bodies)
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
-        self._moved = False
+        self._marks: dict[str, GateMarks] = {}
+        self._moved = self._laid_out = False
         self._open = True
 
     def write(self, block: RunBlock | PlayedBlock) -> None:
@@ -120,6 +130,10 @@ class RecordingWriter:
             self._write_estimates(block, block.reference)
         else:
             self._write_run(block)
+        if self._live is not None and not self._laid_out:
+            # What there is to see is known now; somebody is looking.
+            self._stream.send_blueprint(self._blueprint(live=True))
+            self._laid_out = True
 
     def _write_run(self, block: RunBlock) -> None:
         truth = block.truth.rate
@@ -150,6 +164,10 @@ class RecordingWriter:
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
+                if series.startswith("gated_"):
+                    self._mark(block.start, name, series.removeprefix("gated_"), values, estimate.rate)
+                if series.startswith(("R_", "Q_", "N_")):
+                    self._add(f"/{key}/{LOG}{series}", _log10(values), stride, name, key, detailed=False, gaps=False)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -197,6 +215,9 @@ class RecordingWriter:
             try:
                 self._stream.flush(timeout_sec=LET_GO_TIMEOUT)
             except RuntimeError:
+                if self._live is not None and not self._is_full():
+                    # The window was closed; the file, which is read back next, goes on without it.
+                    return
                 if self._is_full() or time.monotonic() > deadline:
                     raise
             else:
@@ -248,9 +269,20 @@ class RecordingWriter:
                 width=width,
                 detailed=detailed,
                 gaps=gaps,
-                times_ns=None if self._times is None else self._times[clock_of(key)],
+                times_ns=None if self._times is None else self._times.get(clock_of(key)),
             )
         self._signals[entity].write(values)
+
+    def _mark(self, start: int, name: str, sensor: str, count: FloatArray, rate: FloatArray) -> None:
+        """Mark in the line of a filter which readings of a sensor it struck out; only on the clock of the run."""
+        if self._times is not None:
+            return
+        entity, stride = f"/fusion/{name}/{PREFIX}{sensor}", self._fusion_stride
+        if entity not in self._marks:
+            words = f"{name} struck out {sensor}"
+            self._marks[entity] = GateMarks(self._recording, entity, words, self._colors[f"sensors/{sensor}"])
+        index = stride * (-(-start // stride) + np.arange(count.size))
+        self._marks[entity].write(self._recording.clock.nanoseconds(index), count, rate)
 
     def _write_sights(self, block: RunBlock) -> None:
         if block.pointing and self._target is None:
@@ -274,16 +306,18 @@ class RecordingWriter:
                 self._channels[name] = Channel(self._recording, name, heights, self._colors[f"sensors/{name}"])
             self._channels[name].write(index, profiles)
 
-    def _blueprint(self) -> rr.blueprint.Blueprint:
+    def _blueprint(self, *, live: bool = False) -> rr.blueprint.Blueprint:
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
         hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
             entities=[entity for entity in self._signals if entity not in hidden],
+            marks=[entity for entity, marks in self._marks.items() if marks.n],
             sensors=list(self._strides),
             filters=self._fusion_names,
             channels=list(self._channels),
             model=self._model,
             clock=self._recording.clock,
+            live=live,
         )
 
     def _failure(self, reason: str) -> RunError:
@@ -294,3 +328,8 @@ class RecordingWriter:
         else:
             place = f"{'its disk is full: ' if free < FULL else ''}{free / 1e6:.1f} MB free"
         return RunError(f"{self._path}: the recording could not be written ({place}): {reason}")
+
+
+def _log10(values: FloatArray) -> FloatArray:
+    """Return the logarithm; NaN of what has none."""
+    return np.log10(values, where=values > 0.0, out=np.full(values.shape, np.nan))

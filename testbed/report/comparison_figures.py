@@ -124,6 +124,9 @@ def spectra_beside(
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
         axes.xaxis.set_minor_formatter(NullFormatter())
         decade_axis(axes)
+        freq = np.concatenate([digest.filter_errors[name].freq_hz for digest in digests for name in names])
+        if freq.size:
+            axes.set_xlim(0.8 * freq.min(), 1.25 * freq.max())
         axes.grid(visible=True)
         handles: list[Line2D | Patch] = [
             Line2D([], [], color=colors[f"fusion/{name}"], linewidth=2.2, label=label(name)) for name in names

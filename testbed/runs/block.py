@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from testbed.fusion.base import EstimateBlock
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.turntable import TruthBlock
@@ -16,6 +19,26 @@ if TYPE_CHECKING:
 
 # Of a line of sight, what a run keeps.
 POINTING_SIGNALS = ("residual", "knowledge", "tracker_only", "mirror")
+
+
+@dataclass(frozen=True)
+class Ticked:
+    """When a sensor with a clock of its own read in a block.
+
+    Parameters
+    ----------
+    first : int
+        Number of its first reading.
+    times, truth : ndarray, shape (n_reading,)
+        True instants [s], and the true rate there [rad/s].
+    time_ns : ndarray of int, shape (n_reading,)
+        What the logger wrote [ns].
+    """
+
+    first: int
+    times: FloatArray
+    truth: FloatArray
+    time_ns: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -40,6 +63,8 @@ class RunBlock:
         [rad/s].
     pointing : mapping
         What is left of the line of sight, by filter that feeds a mirror forward.
+    ticked : mapping
+        By sensor with a clock of its own: when it read.
     """
 
     start: int
@@ -51,6 +76,7 @@ class RunBlock:
     temperatures: Mapping[str, FloatArray] = field(default_factory=dict)
     drifts: Mapping[str, FloatArray] = field(default_factory=dict)
     pointing: Mapping[str, PointingBlock] = field(default_factory=dict)
+    ticked: Mapping[str, Ticked] = field(default_factory=dict)
 
     @property
     def n_time(self) -> int:
@@ -121,7 +147,7 @@ def _simulated(block: RunBlock, rates: Mapping[str, float]) -> Iterator[Column]:
     for name, values in block.drifts.items():
         yield "truth", f"{name}_drift", block.start, base, values
     for name, values in block.sensors.items():
-        start = first_due(block.start, base, rates[name])
+        start = block.ticked[name].first if name in block.ticked else first_due(block.start, base, rates[name])
         yield f"sensors/{name}", "rate", start, rates[name], values
         if name in block.temperatures:
             yield f"sensors/{name}", "temperature", start, rates[name], block.temperatures[name]

@@ -272,6 +272,26 @@ class ReplayMetrics(Entry):
     notes: list[str] = []
 
 
+class CrossBandMetrics(Entry):
+    """What two sensors share between two frequencies [Hz]: coherence [-], and the second over the first, over what is
+    believed of that: gain [-] and phase [deg], None where they share too little.
+    """
+
+    low_hz: float
+    high_hz: float
+    coherence: float
+    gain_over_belief: float | None = None
+    phase_off_belief_deg: float | None = None
+
+
+class CrossMetrics(Entry):
+    """Two sensors of a recording against each other, by bands."""
+
+    first: str
+    second: str
+    bands: list[CrossBandMetrics] = []
+
+
 class FindingMetrics(Entry):
     """What the verdict found of a sensor: the value with its interval, what to do, and whether it was put right."""
 
@@ -288,8 +308,8 @@ class FindingMetrics(Entry):
 class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
-    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it;
-    `scenario` is its name, and there is no `seed`.
+    Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it, `cross`
+    what its sensors say of each other; `scenario` is its name, and there is no `seed`.
 
     Examples
     --------
@@ -316,6 +336,7 @@ class RunMetrics(Entry):
     replay: ReplayMetrics | None = None
     findings: list[FindingMetrics] = []
     undecided: list[str] = []
+    cross: list[CrossMetrics] = []
     versions: dict[str, Any] = {}
     setup: list[PartSetup] = []
     plugins: list[dict[str, Any]] = []

@@ -76,8 +76,7 @@ class NetcdfStore:
     attributes : mapping
         Provenance, written as global attributes.
     times : mapping of str to ndarray, shape (n_time,), optional
-        Of a recording whose clocks have no whole ratio: the stamps [s] of ``base`` and of every sensor, instead of k /
-        rate.
+        Where clocks have no whole ratio: the stamps [s] of sensors, and of ``base``, that do not come at k / rate.
 
     Raises
     ------
@@ -121,7 +120,7 @@ class NetcdfStore:
             self._raw.check()
 
     def _create(self, group: str, name: str, rate: float, *, still: bool) -> None:
-        stamps = None if self._times is None else self._times[clock_of(group)]
+        stamps = None if self._times is None else self._times.get(clock_of(group))
         n = -(-self._n_base // round(self._rates["base"] / rate)) if stamps is None else stamps.size
         node = self._group(group)
         if "time" not in node.variables:

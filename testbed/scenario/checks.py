@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.errors import RunError, ScenarioError
+from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError, running
 from testbed.models.turntable.floor import Floor
 from testbed.models.turntable.modal import check_modal
@@ -68,20 +69,33 @@ def _check_clocks(scenario: Scenario, document: Document) -> None:
     examples = ", ".join(f"{base / n:g} Hz" for n in (1, 2, 4, 5, 10, 20))
     for name, sensor in scenario.sensors.items():
         ratio = base / sensor.sample_rate
-        if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 1:
+        whole = abs(ratio - round(ratio)) <= 1e-9 * ratio and round(ratio) >= 1
+        if not whole and (ratio < 1.0 or not sensor.any_clock):
             document.find(
                 ("sensors", name, "sample_rate"),
                 f"expected {base:g} Hz divided by a whole number ({examples}, ...), got {sensor.sample_rate:g} Hz",
             )
-    rates = sorted({sensor.sample_rate for sensor in scenario.sensors.values()})
-    for rate in rates[:-1]:
-        if scenario.fusion and abs(rates[-1] / rate - round(rates[-1] / rate)) > 1e-9 * rates[-1] / rate:
-            document.find(
-                ("sensors",),
-                f"expected sample rates that are whole multiples of each other, got {rate:g} Hz and {rates[-1]:g} Hz",
-            )
+        if sensor.clock is not None and not sensor.any_clock:
+            document.find(("sensors", name, "clock"), f"{scenario.sensor_types[name]} reads at samples of the run only")
+    if not document.problems and any(sensor.clocked(base) for sensor in scenario.sensors.values()):
+        _check_own_clocks(scenario, document)
     if scenario.fusion and not scenario.sensors:
         document.find(("fusion",), "there is nothing to fuse: name at least one sensor under 'sensors:'")
+
+
+def _check_own_clocks(scenario: Scenario, document: Document) -> None:
+    """Find what does not go with sensors that read between the samples of the run."""
+    fastest = max(scenario.sensors, key=lambda name: scenario.sensors[name].sample_rate)
+    if scenario.fusion and scenario.sensors[fastest].clocked(scenario.base_rate_hz):
+        document.find(
+            ("sensors", fastest),
+            "expected the fastest sensor, at whose readings the filters estimate, on the clock of the run: no clock of "
+            f"its own, and {scenario.base_rate_hz:g} Hz divided by a whole number",
+        )
+    if scenario.pointing is not None:
+        document.find(("pointing",), "expected sensors on the clock of the run, whose angles are compared")
+    if scenario.frame.fusion_from:
+        document.find(("fusion_from",), "expected sensors on the clock of the run, whose readings are counted")
 
 
 def _check_plant(scenario: Scenario, document: Document) -> None:
@@ -139,9 +153,12 @@ def _check_filters(scenario: Scenario, document: Document) -> None:
     if document.problems:
         return
     rates = {name: sensor.sample_rate for name, sensor in scenario.sensors.items()}
+    own = any(sensor.clocked(scenario.base_rate_hz) for sensor in scenario.sensors.values())
     for name, spec in scenario.fusion.items():
         try:
-            spec.start(rates)
+            stage = spec.start(rates)
+            if own:
+                CheckedFilter(name, stage, max(rates.values()), shipped=True).check_clocks()
         except (ValueError, TypeError) as error:
             document.find(("fusion", name), f"{spec.type}: {error}")
 

@@ -19,9 +19,11 @@ from pydantic import (
 
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
+from testbed.sensors.clock import OwnClock, Ticks, TickSampler, ticks_of
 from testbed.sensors.data_sheet import Sheet, Word
 from testbed.sensors.faults import Fault, FaultStage, first_overlap
-from testbed.signals import BASE_RATE_HZ
+from testbed.sensors.losses import Losses, LossStage
+from testbed.signals import BASE_RATE_HZ, random_stream
 from testbed.units import SampleRate
 
 if TYPE_CHECKING:
@@ -115,14 +117,18 @@ class Sensor(Part):
     Parameters
     ----------
     sample_rate : float
-        Rate of the readings [Hz]; reading j is at t = j / sample_rate.
+        Rate of the readings [Hz]; reading j is at t = j / sample_rate by its clock.
+    clock : OwnClock, optional
+        A clock of its own, such as ``{error: 20 ppm, walk: 1 us, offset: 1 ms}``; left out, the run's.
     noise : bool
         Off: nothing random and no rounding, so that a run can be exact; the dynamics, the constant errors and the
-        range stay.
+        range stay, and so does the clock.
     mounting : Mounting
         Where it sits on the table and how far its axis is off.
     faults : tuple of Fault
         Spans in which the readings are none, behind everything else, such as ``[{kind: stuck, at: 5 s, length: 1 s}]``.
+    lost : Losses, optional
+        Readings that do not arrive, such as ``{bursts: {every: 5 s, length: 20 ms}}``; none with `noise` off.
 
     Attributes
     ----------
@@ -131,11 +137,23 @@ class Sensor(Part):
     """
 
     words: ClassVar[tuple[Word, ...]] = ()
+    any_clock: ClassVar[bool] = False
+    """It can read at any instants, not only at samples of the run."""
 
     sample_rate: SampleRate
+    clock: OwnClock | None = None
     noise: bool = True
     mounting: Mounting = Mounting()
     faults: tuple[Fault, ...] = ()
+    lost: Losses | None = None
+
+    @model_validator(mode="after")
+    def _ticks_in_order(self) -> Self:
+        most = 0.1 / self.sample_rate**0.5
+        if self.clock is not None and self.clock.walk > most:
+            msg = f"clock.walk: expected at most {most:.3g} s at {self.sample_rate:g} Hz, got {self.clock.walk:g} s"
+            raise ValueError(msg)
+        return self
 
     @field_validator("faults")
     @classmethod
@@ -243,6 +261,32 @@ class Sensor(Part):
             Response [-].
         """
 
+    def clocked(self, input_rate_hz: float) -> bool:
+        """Return whether its readings fall between the samples of a clock of `input_rate_hz` [Hz], or have stamps that
+        are late.
+        """
+        return self.clock is not None or not _whole(input_rate_hz, self.sample_rate)
+
+    def ticks(self, seed: int, name: str) -> Ticks:
+        """Return when it reads; arguments as `start`."""
+        return ticks_of(self.clock, self.sample_rate, seed, name)
+
+    def sampler(self, input_rate_hz: float, seed: int, name: str) -> Decimator | TickSampler:
+        """Return what takes its readings from a signal of `input_rate_hz`; arguments as `start`.
+
+        Raises
+        ------
+        ValueError
+            If there are less samples than readings.
+        """
+        if self.clocked(input_rate_hz) and self.sample_rate <= input_rate_hz:
+            return TickSampler(self.ticks(seed, name), input_rate_hz)
+        return Decimator(rate_ratio(input_rate_hz, self.sample_rate))
+
+    def start_losses(self, seed: int, name: str) -> LossStage:
+        """Return what loses readings at random; arguments as `start`."""
+        return LossStage(self.lost if self.noise else None, self.sample_rate, random_stream(seed, name, "lost"))
+
     def start_faults(self) -> FaultStage:
         """Return the stage behind that of `start`: what becomes of its readings."""
         return FaultStage(self.faults, self.sample_rate, self.full_scale())
@@ -331,7 +375,8 @@ class Sensor(Part):
         if record.ndim != 1:
             msg = f"rate: expected shape (n_time,), got {record.shape}"
             raise ValueError(msg)
-        return self.start_faults().process(self.start(input_rate_hz, seed, "sensor").process(record))
+        readings = self.start_faults().process(self.start(input_rate_hz, seed, "sensor").process(record))
+        return self.start_losses(seed, "sensor").process(readings)
 
 
 def rate_ratio(input_rate_hz: float, sample_rate_hz: float) -> int:
@@ -353,15 +398,15 @@ def rate_ratio(input_rate_hz: float, sample_rate_hz: float) -> int:
         If the ratio is no whole number of at least one.
     """
     ratio = round(input_rate_hz / sample_rate_hz)
-    if ratio < 1 or abs(ratio * sample_rate_hz - input_rate_hz) > 1e-9 * input_rate_hz:
+    if not _whole(input_rate_hz, sample_rate_hz):
         msg = f"sample_rate: expected {input_rate_hz:g} Hz over a whole number, got {sample_rate_hz:g} Hz"
         raise ValueError(msg)
     return ratio
 
 
-def rounding_psd(step: float, sample_rate_hz: float) -> float:
-    """Return the two-sided density step^2 / (12 fs) [rad^2/s] of rounding to `step` [rad/s] at fs [Hz]."""
-    return step**2 / 12.0 / sample_rate_hz
+def _whole(input_rate_hz: float, sample_rate_hz: float) -> bool:
+    ratio = round(input_rate_hz / sample_rate_hz)
+    return ratio >= 1 and abs(ratio * sample_rate_hz - input_rate_hz) <= 1e-9 * input_rate_hz
 
 
 class Decimator:
@@ -375,31 +420,3 @@ class Decimator:
         taken = samples[self._skip :: self._ratio]
         self._skip = (self._skip - samples.size) % self._ratio
         return taken
-
-
-class Converter:
-    """Range and word of an analogue-to-digital converter in units of the reading.
-
-    Parameters
-    ----------
-    step : float
-        One count [rad/s].
-    bits : int
-        Word length, two's complement [-].
-    limit : float
-        Range, symmetric [rad/s].
-    rounding : bool
-        Off: the range alone.
-    """
-
-    def __init__(self, step: float, bits: int, limit: float, *, rounding: bool) -> None:
-        self._step, self._limit, self._rounding = step, limit, rounding
-        self._lowest, self._highest = -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
-
-    def process(self, rate: FloatArray) -> FloatArray:
-        """Return the converted readings [rad/s]; NaN stays NaN."""
-        held: FloatArray = np.clip(rate, -self._limit, self._limit)
-        if not self._rounding:
-            return held
-        counts: FloatArray = np.clip(np.rint(held / self._step), self._lowest, self._highest)
-        return counts * self._step

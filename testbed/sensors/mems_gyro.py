@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.base import Decimator, Sensor, Surroundings
+from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word, low_pass_schema
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from testbed.sensors.clock import TickSampler
     from testbed.signals import ComplexArray, FloatArray
 
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]
@@ -66,6 +68,7 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
     `in_run_bias_stability` (Allan floor), `bandwidth` (-3 dB) with `order` (2); see `testbed.sensors.data_sheet`.
     """
 
+    any_clock = True
     words: ClassVar[tuple[Word, ...]] = GYRO_WORDS
 
     numerator: Coefficients | None = None
@@ -116,6 +119,9 @@ class MemsGyro(GyroErrors, Sensor, GyroTerms):
 
     @model_validator(mode="after")
     def _young_enough(self) -> Self:
+        if self.jitter and self.clocked(BASE_RATE_HZ):
+            msg = "jitter: expected none beside a clock of its own or a rate that does not divide the run's 20 kHz"
+            raise ValueError(msg)
         if self.jitter > 1.0 / self.sample_rate:
             msg = (
                 f"jitter: expected at most one period of the readings, {1e3 / self.sample_rate:g} ms, "
@@ -234,7 +240,8 @@ class MemsGyroStage:
     """A MEMS gyro in time; made by `MemsGyro.start`."""
 
     def __init__(self, gyro: MemsGyro, input_rate_hz: float, seed: int, name: str) -> None:
-        ratio = rate_ratio(input_rate_hz, gyro.sample_rate)
+        sampler = gyro.sampler(input_rate_hz, seed, name)
+        ratio = max(round(input_rate_hz / gyro.sample_rate), 1)
         if isinstance(gyro.fir, tuple) and input_rate_hz != BASE_RATE_HZ:
             msg = f"input_rate_hz: expected {BASE_RATE_HZ:g} Hz, the clock of the fir's weights, got {input_rate_hz:g}"
             raise ValueError(msg)
@@ -255,7 +262,7 @@ class MemsGyroStage:
         self._ramp = Ramp(gyro.rate_ramp if gyro.noise else 0.0, input_rate_hz)
         self._low_pass = LinearFilter(list(numerator), list(denominator), input_rate_hz)
         self._fir = Fir(gyro.weights(ratio))
-        self._decimator: Decimator | AgedSampler = Decimator(ratio)
+        self._decimator: Decimator | TickSampler | AgedSampler = sampler
         if gyro.jitter:
             self._decimator = AgedSampler(ratio, gyro.jitter * input_rate_hz, stream("jitter") if gyro.noise else None)
         self._converter = Converter(gyro.resolution, gyro.word_bits, gyro.full_scale(), rounding=gyro.noise)

@@ -13,7 +13,8 @@ from testbed.models.mhd_channel.linear_range import linear_range
 from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
-from testbed.sensors.base import Converter, Decimator, Sensor, Surroundings, rate_ratio, rounding_psd
+from testbed.sensors.base import Sensor, Surroundings
+from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
@@ -49,6 +50,9 @@ class MhdArs(Sensor, ElectronicTerms):
         Calibrated scale factor over the bare channel's, set so that the pass band reads true [-].
     scale_factor_error : float
         Relative error of that calibration [-].
+    nonlinearity : float
+        How far a reading at full scale departs from the line of small ones, over full scale; the departure grows with
+        the cube of the rate [-].
     transformer : Transformer, optional
         High-pass between electrodes and amplifier.
     amplifier_pole : float
@@ -74,6 +78,7 @@ class MhdArs(Sensor, ElectronicTerms):
     which is two-sided; see `testbed.sensors.data_sheet`.
     """
 
+    any_clock = True
     words: ClassVar[tuple[Word, ...]] = (
         OUTPUT_RATE,
         replace(RATE_NOISE_DENSITY, field="noise_density", shown="nrad/s/sqrt(Hz)"),
@@ -84,6 +89,7 @@ class MhdArs(Sensor, ElectronicTerms):
     ring: ChannelRing | None = None
     gain: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
     scale_factor_error: Annotated[float, Quantity("", "0.5 %", above=-1.0)] = 0.0
+    nonlinearity: Annotated[float, Quantity("", "0.1 %", above=-0.3)] = 0.0
     transformer: Transformer | None = None
     amplifier_pole: Frequency
     second_pole: Frequency | None = None
@@ -183,10 +189,12 @@ class MhdArsStage:
     """An MHD angular rate sensor in time; made by `MhdArs.start`. `heights` [m] are the points of its `profile`."""
 
     def __init__(self, sensor: MhdArs, input_rate_hz: float, seed: int, name: str) -> None:
-        self._decimator = Decimator(rate_ratio(input_rate_hz, sensor.sample_rate))
+        self._decimator = sensor.sampler(input_rate_hz, seed, name)
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
         self._gain, self._first = sensor.channel_gain, np.nan
+        # As if the field's path or the amplifier's first stage bent, before any pole.
+        self._bend = sensor.nonlinearity / (sensor.adc_range / sensor.scale_factor) ** 2
         self._before, self._behind = _analogue_chain(sensor, input_rate_hz)
         # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
         self._early = sensor.saturation is not None
@@ -209,6 +217,7 @@ class MhdArsStage:
             # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
             self._channel.begin(self._first)
         signal = self._gain * self._channel.process(true_rate)
+        signal = signal * (1.0 + self._bend * signal**2) if self._bend else signal
         for stage in self._before:
             signal = stage.process(signal)
         if self._early:

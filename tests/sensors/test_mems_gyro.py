@@ -119,7 +119,8 @@ def test_low_pass_is_checked(keys: dict[str, object], message: str) -> None:
         MemsGyro.model_validate({**REST, **keys})
 
 
-def test_reading_rate_must_divide_the_input_rate() -> None:
+def test_it_reads_at_most_as_often_as_there_are_samples() -> None:
     sensor = MemsGyro.model_validate({**REST, "sample_rate": 3000.0, "corner": 100.0})
-    with pytest.raises(ValueError, match="sample_rate: expected 20000 Hz over a whole number, got 3000 Hz"):
-        sensor.start(20000.0, 0, "gyro")
+    assert sensor.start(20000.0, 0, "gyro").process(np.zeros(20001)).size == 3000
+    with pytest.raises(ValueError, match="sample_rate: expected 2000 Hz over a whole number, got 3000 Hz"):
+        sensor.start(2000.0, 0, "gyro")

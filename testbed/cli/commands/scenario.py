@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -27,6 +28,7 @@ def run(
         typer.Option(metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Open the viewer now and watch the run in it.")] = False,
     plugin: PluginModules = None,
     allow_outside: AllowOutside = False,
 ) -> None:
@@ -36,22 +38,30 @@ def run(
     from testbed.cli.check_page import size_words, warnings
     from testbed.cli.terminal import print_metrics
     from testbed.logs.options import quantity
+    from testbed.recording.viewer import live_window
     from testbed.runs.outputs import chosen
     from testbed.scenario.loader import load_scenario
 
     wanted = chosen(None if outputs is None else [name.strip() for name in outputs.split(",")])
-    if view and "recording" not in wanted:
-        raise ScenarioError([Problem("--view shows the recording: add recording", "outputs")])
+    if (view or live) and "recording" not in wanted:
+        shows = "--live" if live else "--view"
+        raise ScenarioError([Problem(f"{shows} shows the recording: add recording", "outputs")])
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
     loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     output.warn(warnings(loaded))
     output.note(f"{loaded.name}: {size_words(forecast(loaded, wanted))}")
     target = out or Path("runs") / loaded.name
-    with output.progress(loaded.name, loaded.frame.duration) as tick:
-        result = run_scenario(loaded, out=target, seed=seed, outputs=wanted, block=length, progress=tick)
-    document = {**result.metrics.to_dict(), "written": str(target)}
-    output.show(document, lambda: print_metrics(result.metrics, target))
-    if view:
+    with ExitStack() as stack:
+        address, window = stack.enter_context(live_window()) if live else (None, None)
+        with output.progress(loaded.name, loaded.frame.duration) as tick:
+            result = run_scenario(
+                loaded, out=target, seed=seed, outputs=wanted, block=length, progress=tick, live=address
+            )
+        document = {**result.metrics.to_dict(), "written": str(target)}
+        output.show(document, lambda: print_metrics(result.metrics, target))
+        if window is not None:
+            window.wait()
+    if view and not live:
         from testbed.recording.viewer import open_viewer
 
         open_viewer(target)
