@@ -49,16 +49,21 @@ copybutton_prompt_is_regexp = True
 mathjax_path = "mathjax/tex-svg.js"
 html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"testbed {release}"
 html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,
+    # Sixty pages do not fit into a bar; they stand beside each page, under the headings of index.md.
+    "navbar_center": [],
+    "globaltoc_includehidden": True,
     "navbar_end": ["theme-switcher"],
     "footer_start": [],
     "footer_end": [],
     "secondary_sidebar_items": ["page-toc"],
 }
+html_sidebars = {"**": ["globaltoc.html"]}
 linkcheck_timeout = 20
 
 sphinx_gallery_conf = {

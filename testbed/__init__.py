@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from testbed.chain.sight import line_of_sight
     from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
     from testbed.fusion import estimate, list_filters
+    from testbed.identification.session import identify_sensors
     from testbed.logs import read_log
     from testbed.models.motions import list_motions
     from testbed.notebook import Run, open_run
@@ -103,6 +104,7 @@ __all__ = [
     "estimate",
     "evaluate",
     "export",
+    "identify_sensors",
     "line_of_sight",
     "list_filters",
     "list_motions",
@@ -130,6 +132,7 @@ _LAZY = {
     "estimate": "testbed.fusion",
     "evaluate": "testbed.campaigns.evaluate",
     "export": "testbed.playback.export",
+    "identify_sensors": "testbed.identification.session",
     "line_of_sight": "testbed.chain.sight",
     "open_sweep": "testbed.campaigns.sweep",
     "sweep": "testbed.campaigns.sweep",

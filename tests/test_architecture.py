@@ -35,6 +35,7 @@ ROOMS = {
     "scenario": {"models", "sensors", "fusion", "pointing"},
     "report": {"pages", "metrics", "runs"},
     "recording": {"pages", "metrics", "runs"},
+    "identification": {"fusion", "logs", "metrics", "pages"},
     "notebook": {"pages", "runs", "report"},
     "judging": {"logs", "metrics", "allan", "pages", "runs", "scenario", "sensors", "models", "fusion", "pointing"},
     "chain": {

@@ -34,6 +34,7 @@ EXAMPLES = [
     "testbed.fusion",
     "testbed.fusion.analysis.verdict",
     "testbed.fusion.belief",
+    "testbed.identification.session",
     "testbed.logs.reader",
     "testbed.models.mhd_channel.channel",
     "testbed.models.motions",
@@ -100,6 +101,11 @@ def test_every_public_function_can_be_called_with_every_package_imported(tmp_pat
         "list_sensors": testbed.list_sensors(),
         "read_log": testbed.read_log(log),
     }
+    t = np.arange(2000) / 500.0
+    rate = sum(np.sin(2.0 * np.pi * freq * t) for freq in (3.0, 7.0, 19.0))
+    table = np.column_stack([t, rate, 0.9 * rate + 1e-3 * np.random.default_rng(1).standard_normal(t.size)])
+    np.savetxt(tmp_path / "bench.csv", table, header="t [s],laser [deg/s],gyro [deg/s]", comments="", delimiter=",")
+    called["identify_sensors"] = testbed.identify_sensors(testbed.read_log(tmp_path / "bench.csv"), "laser", "gyro")
     called["line_of_sight"] = testbed.line_of_sight(tmp_path / "run", {"tracker": {"bandwidth": "10 Hz"}})
     (tmp_path / "study.yaml").write_text(f"name: study\nbase: {path.name}\n")
     called["sweep"] = testbed.sweep(tmp_path / "study.yaml", out=tmp_path / "sweep")

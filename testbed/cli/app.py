@@ -12,6 +12,7 @@ from testbed.cli.commands import (
     compensate,
     design,
     folder,
+    identify,
     log,
     parts,
     playback,
@@ -41,6 +42,7 @@ app.command()(allan.allan)
 app.command()(psd.psd)
 app.command()(playback.replay)
 app.command()(playback.export)
+app.command()(identify.identify)
 app.command()(pointing.pointing)
 app.command()(design.design)
 app.command()(reproduce.reproduce)

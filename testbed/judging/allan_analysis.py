@@ -306,10 +306,10 @@ def write_figure(figure: Figure, path: Path) -> Path:
     return path
 
 
-def figure_format(path: Path) -> str:
-    """Return the format that the suffix of a path names; ScenarioError if it is none of `FORMATS`."""
+def figure_format(path: Path, option: str = "--out") -> str:
+    """Return the format that the suffix of a path names; ScenarioError, at the option, if it is none of `FORMATS`."""
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
         msg = f"expected a file that ends in {', '.join('.' + name for name in FORMATS)}, got {str(path)!r}"
-        raise ScenarioError([Problem(msg, key="--out")])
+        raise ScenarioError([Problem(msg, key=option)])
     return kind

@@ -140,7 +140,7 @@ class LogChannel:
             return self
         values = self.even()
         if self.kind == "angle":
-            values = np.diff(_unwound(values))
+            values = np.diff(unwound(values))
         values = values * self.rate_hz
         return replace(self, values=values, kind="rate", quantity="rate", stamps_ns=None)
 
@@ -206,8 +206,8 @@ def _refuse_kind(channel: LogChannel) -> NoReturn:
     raise refusal(path, message, "--unit")
 
 
-def _unwound(angle: FloatArray) -> FloatArray:
-    """Return an angle without the jumps of a whole turn that an encoder makes."""
+def unwound(angle: FloatArray) -> FloatArray:
+    """Return an angle [rad], shape (n_time,), without the jumps of a whole turn that an encoder makes."""
     steps = np.diff(angle)
     if np.nanmax(np.abs(steps), initial=0.0) < 0.5 * _TURN:
         return angle

@@ -200,6 +200,12 @@ def prepare(
     source = open_source([log] if isinstance(log, str | Path) else log, map)
     names, file = _asked(filters)
     specs = filter_specs(source.sensors, names, fusion if file is None else file, belief, start, loaded)
+    both = [name for name in specs if name in source.sensors]
+    if both:
+        message = (
+            f"is the name of a sensor too: give the filter another one, such as 'mine: {{type: {specs[both[0]].type}}}'"
+        )
+        raise ScenarioError([Problem(message, f"fusion.{both[0]}")])
     reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, fix=fix)
     reference = None if source.reference is None else wind(source.reference, middle=True)
     lineup = line_up(reels, reference, source.log)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, shortened
 from testbed.logs.channel import Log
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import LogMap
@@ -18,13 +19,14 @@ from testbed.runs.folder import SIGNALS
 from testbed.runs.results import RunRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from testbed.logs.channel import LogChannel
     from testbed.logs.plan import Plan
     from testbed.runs.signals import Signals
 
 REFERENCE = "reference"
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,14 @@ def _named(one: Plan, plans: Sequence[Plan]) -> Plan:
     return replace(one, name=name) if short.count(name) == 1 else one
 
 
+def _check_names(sensors: Iterable[str], place: Path) -> None:
+    """Refuse names that a signal of a run cannot have: letters, digits and underscores, and not that of the clock."""
+    odd = [name for name in sensors if not _NAME.fullmatch(name) or name == "base"]
+    message = "expected a name of at most 64 letters, digits and underscores, and not 'base': give it one in a map"
+    if odd:
+        raise ScenarioError([Problem(message, f"channels.{shortened(name)}", str(place)) for name in odd])
+
+
 def _source(place: Path, channels: Mapping[str, LogChannel]) -> ReplaySource:
     turning = {name: one for name, one in channels.items() if one.quantity in ROTATIONS or one.kind is not None}
     others = [name for name in channels if name not in turning]
@@ -144,6 +154,7 @@ def _source(place: Path, channels: Mapping[str, LogChannel]) -> ReplaySource:
     reference = next((one for name, one in turning.items() if name.lower() == REFERENCE), None)
     if not sensors:
         raise refusal(place, "expected a channel that is a rate or an angle beside the reference, got none")
+    _check_names(sensors, place)
     stem = place.resolve().name.split(".")[0]
     name = place.resolve().parent.name if stem in {"log", "run", "data"} else stem
     return ReplaySource(name or "recording", str(place), sensors, reference, notes)

@@ -27,7 +27,7 @@ FEWEST = 1000  # samples in both, at the least
 LEGEND = 0.25  # room for the legend, as a share of the span
 LOG = "log10_"
 # Points of the screen: what plots share in a window of 900, what a plot needs beside its legend, and a name in that.
-ROOM, FRAME, ENTRY = 840, 62, 19
+ROOM, FRAME, ENTRY = 834, 88, 23
 DIAGNOSTICS = {  # prefix of the name: quantity and unit
     # The viewer has no logarithmic axis: what spans decades is recorded as its logarithm too.
     f"{LOG}R_": ("Adapted R", "log10 of (rad/s)²"),
@@ -58,6 +58,7 @@ def blueprint(
     channels: Sequence[str],
     model: mujoco.MjModel | None,
     clock: Clock,
+    marks: Sequence[str] = (),
     live: bool = False,
 ) -> rrb.Blueprint:
     """Return the layout for the signals that the recording has.
@@ -72,6 +73,8 @@ def blueprint(
         The bodies, for the place of the camera; a recording that is replayed has none.
     clock : Clock
         Length of the run and the window recorded sample by sample.
+    marks : sequence of str, optional
+        Paths of the crosses of readings that were struck out.
     live : bool, optional
         Whether the time cursor follows what comes in; else it stands.
     """
@@ -92,11 +95,11 @@ def blueprint(
         (
             "Rates, closer",
             [
-                _plot(f"Rate, {span} [rad/s]", rates, zoom),
-                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", rates, around),
+                _plot(f"Rate, {span} [rad/s]", [*rates, *marks], zoom),
+                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", [*rates, *marks], around),
                 _plot(f"{estimated} [rad/s]", truth_and_filters, (0.0, duration)),
             ],
-            len(rates),
+            len(rates) + len(marks),
         ),
     ]
     views: list[rrb.View | rrb.Container]
@@ -123,8 +126,11 @@ def blueprint(
             _plot("True thermal drift [rad/s]", drifts, (0.0, duration)),
         ]
         right.append(("Temperature", views, len(thermometers)))
-    if diagnostics := _diagnostics(entities, sensors, duration):
-        right.append(("Inside the filters", diagnostics, len(filters) + 1))
+    if diagnostics := _diagnostics(entities, sensors):
+        views = [_beside(kind, by_sensor, duration) for kind, by_sensor in diagnostics.items()]
+        # Plots beside each other have titles of their own below the tabs'.
+        n_lines = 1 + max(map(len, next(iter(diagnostics.values())).values()))
+        right.append(("Inside the filters", views, n_lines))
     shares = {"row_shares": [3, 2, 2][: len(left)]} if len(left) > 1 else {}
     plots = _rows(right)
     return rrb.Blueprint(
@@ -185,8 +191,10 @@ def _series(name: str, contents: Iterable[str], data: rr.TimeRange, shown: rr.Ti
     )
 
 
-def _diagnostics(entities: Sequence[str], sensors: Sequence[str], duration: float) -> list[rrb.View | rrb.Container]:
-    """One tab per quantity, in it one plot per sensor, for the sensors differ by orders of magnitude."""
+def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+    """Return by quantity, which is a tab, and sensor the entities of a plot, for sensors differ by orders of magnitude;
+    what is there as its logarithm is seen as that.
+    """
     groups: dict[str, dict[str, list[str]]] = {kind: {} for kind in DIAGNOSTICS}
     for entity in entities:
         top, _, name, *_ = [*entity.split("/")[1:], ""]
@@ -195,8 +203,7 @@ def _diagnostics(entities: Sequence[str], sensors: Sequence[str], duration: floa
             kind = max((kind for kind in DIAGNOSTICS if name.startswith(kind)), key=len)
             of = name.removeprefix(kind)
             groups[kind].setdefault(of if of in sensors or not kind else "", []).append(entity)
-    seen = {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
-    return [_beside(kind, by_sensor, duration) for kind, by_sensor in seen.items()]
+    return {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
 
 
 def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float) -> rrb.View | rrb.Container:

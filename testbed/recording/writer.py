@@ -17,6 +17,7 @@ from testbed.errors import RunError
 from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
 from testbed.recording.layout import LOG, blueprint
+from testbed.recording.marks import PREFIX, GateMarks
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
@@ -118,6 +119,7 @@ class RecordingWriter:
         self._world = None if model is None else World(self._recording, model, bodies)
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
+        self._marks: dict[str, GateMarks] = {}
         self._moved = self._laid_out = False
         self._open = True
 
@@ -162,6 +164,8 @@ class RecordingWriter:
             self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
+                if series.startswith("gated_"):
+                    self._mark(block.start, name, series.removeprefix("gated_"), values, estimate.rate)
                 if series.startswith(("R_", "Q_", "N_")):
                     self._add(f"/{key}/{LOG}{series}", _log10(values), stride, name, key, detailed=False, gaps=False)
 
@@ -269,6 +273,17 @@ class RecordingWriter:
             )
         self._signals[entity].write(values)
 
+    def _mark(self, start: int, name: str, sensor: str, count: FloatArray, rate: FloatArray) -> None:
+        """Mark in the line of a filter which readings of a sensor it struck out; only on the clock of the run."""
+        if self._times is not None:
+            return
+        entity, stride = f"/fusion/{name}/{PREFIX}{sensor}", self._fusion_stride
+        if entity not in self._marks:
+            words = f"{name} struck out {sensor}"
+            self._marks[entity] = GateMarks(self._recording, entity, words, self._colors[f"sensors/{sensor}"])
+        index = stride * (-(-start // stride) + np.arange(count.size))
+        self._marks[entity].write(self._recording.clock.nanoseconds(index), count, rate)
+
     def _write_sights(self, block: RunBlock) -> None:
         if block.pointing and self._target is None:
             self._target = Target(self._recording, {name: self._colors[f"fusion/{name}"] for name in block.pointing})
@@ -296,6 +311,7 @@ class RecordingWriter:
         hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
             entities=[entity for entity in self._signals if entity not in hidden],
+            marks=[entity for entity, marks in self._marks.items() if marks.n],
             sensors=list(self._strides),
             filters=self._fusion_names,
             channels=list(self._channels),

@@ -50,6 +50,9 @@ class MhdArs(Sensor, ElectronicTerms):
         Calibrated scale factor over the bare channel's, set so that the pass band reads true [-].
     scale_factor_error : float
         Relative error of that calibration [-].
+    nonlinearity : float
+        How far a reading at full scale departs from the line of small ones, over full scale; the departure grows with
+        the cube of the rate [-].
     transformer : Transformer, optional
         High-pass between electrodes and amplifier.
     amplifier_pole : float
@@ -86,6 +89,7 @@ class MhdArs(Sensor, ElectronicTerms):
     ring: ChannelRing | None = None
     gain: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
     scale_factor_error: Annotated[float, Quantity("", "0.5 %", above=-1.0)] = 0.0
+    nonlinearity: Annotated[float, Quantity("", "0.1 %", above=-0.3)] = 0.0
     transformer: Transformer | None = None
     amplifier_pole: Frequency
     second_pole: Frequency | None = None
@@ -189,6 +193,8 @@ class MhdArsStage:
         self._channel = sensor.warm_channel.start(input_rate_hz)
         self.heights = sensor.channel.heights
         self._gain, self._first = sensor.channel_gain, np.nan
+        # As if the field's path or the amplifier's first stage bent, before any pole.
+        self._bend = sensor.nonlinearity / (sensor.adc_range / sensor.scale_factor) ** 2
         self._before, self._behind = _analogue_chain(sensor, input_rate_hz)
         # Rails are not linear, so in front of them the Johnson noise has to be there sample by sample.
         self._early = sensor.saturation is not None
@@ -211,6 +217,7 @@ class MhdArsStage:
             # The fluid has turned with the walls before the record: a constant rate, such as the Earth's, is no step.
             self._channel.begin(self._first)
         signal = self._gain * self._channel.process(true_rate)
+        signal = signal * (1.0 + self._bend * signal**2) if self._bend else signal
         for stage in self._before:
             signal = stage.process(signal)
         if self._early:

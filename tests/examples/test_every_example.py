@@ -44,6 +44,7 @@ SMALL = {
         ["1"],
         "gain of an injected rate",
     ),
+    "replay_with_faults": (lambda _its: {}, [], "sign -1 put right"),
     "identify_paper2": (lambda _its: {}, [], "largest error"),
     "mode_groups": (
         lambda its: {"SEEDS": range(2), "record": partial(its.record, 4000)},

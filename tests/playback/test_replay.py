@@ -146,3 +146,18 @@ def test_what_a_filter_refuses_is_told_by_its_name(bench):
     with pytest.raises(ScenarioError, match="blending: belief: expected two sensors") as error:
         testbed.replay(bench[1] / "run.nc", ["blending", "kalman", "wideband"], map=said)
     assert "kalman" not in str(error.value)
+
+
+def test_an_interrupt_leaves_nothing_behind(bench, tmp_path):
+    """A block is done, then the user stops it: an earlier folder there stays as it was."""
+
+    def stop(_done):
+        raise KeyboardInterrupt
+
+    place = tmp_path / "kept"
+    testbed.replay(bench[1], ["blending"], out=place, outputs=["metrics"])
+    before = (place / "metrics.json").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        testbed.replay(bench[1], ["kalman"], out=place, block=1000, progress=stop)
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+    assert (place / "metrics.json").read_bytes() == before

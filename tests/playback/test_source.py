@@ -89,3 +89,16 @@ def test_no_recording_is_told():
         testbed.replay([], ["kalman"])
     with pytest.raises(ScenarioError, match="expected a recording"):
         testbed.replay("nowhere.csv", ["kalman"])
+
+
+def test_a_channel_without_a_plain_name_needs_one(tmp_path):
+    path = bench_csv(tmp_path, "t_us,gyro[0] [deg/s],base [deg/s],temp [degC]")
+    with pytest.raises(ScenarioError, match=r"channels.gyro\[0\]: expected a name of at most 64 letters") as error:
+        testbed.replay(path, ["kalman"])
+    assert [problem.key for problem in error.value.problems] == ["channels.gyro[0]", "channels.base"]
+
+
+def test_a_filter_is_not_called_as_a_sensor(tmp_path):
+    said = {"mems_gyro": {"type": "kalman"}}
+    with pytest.raises(ScenarioError, match=r"fusion.mems_gyro: is the name of a sensor too"):
+        testbed.replay(bench_csv(tmp_path), said)

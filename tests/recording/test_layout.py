@@ -15,7 +15,7 @@ def row(name, n_lines):
 
 
 def test_a_row_is_as_high_as_its_legend_needs():
-    """Seven names beside three: 62 points and 19 for each, of what a window of 900 points has."""
+    """Seven names and three, as a run of three filters has them, fit into a window of 900 points."""
     found = _rows([row("a", 7), row("b", 7), row("c", 3), row("d", 3)])
     assert list(found.row_shares) == [FRAME + 7 * ENTRY] * 2 + [FRAME + 3 * ENTRY] * 2
     assert sum(found.row_shares) <= ROOM
@@ -37,3 +37,15 @@ def test_what_spans_decades_is_there_as_its_logarithm_too(synthetic_run, tmp_pat
     np.testing.assert_array_equal(log[:, 1], np.log10(plain[:, 1]))
     names = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert "/fusion/kalman/log10_innovation_mems_gyro" not in names
+
+
+def test_readings_that_were_struck_out_are_marked_on_the_filters_line(synthetic_run, tmp_path):
+    """Three rises of the count, one at the first sample of a block; however the run is cut."""
+    run = synthetic_run(30_000, filters=("kalman",))
+    struck = np.array([5, 10_000, 22_222])
+    run.diagnostics["gated_mhd_ars"] = np.searchsorted(struck, np.arange(run.n_time), side="right").astype(float)
+    for size in (10_000, 7_777):
+        path = run.record(tmp_path / f"{size}.rrd", size)
+        found = rows(path, "/fusion/kalman/struck_mhd_ars")
+        np.testing.assert_array_equal(found[:, 0], struck * 50_000)
+        np.testing.assert_array_equal(found[:, 1], run.estimates["kalman"][struck])

@@ -26,6 +26,8 @@ from testbed.reproduce.paper2 import (
     report,
     switched_on,
 )
+from testbed.reproduce.paper2.figures import both_responses, followed
+from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, rival_lines, table_filters, worst
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ
 
@@ -45,6 +47,7 @@ FEW = BenchProtocol(
     linear_observe=0.5,
     warm_up=2.0,
     standstill=4.0,
+    sines=SineProtocol(frequencies=(5.0, 40.0), settle=0.5, observe=0.4),
 )
 
 
@@ -84,6 +87,21 @@ def test_tables_are_written_and_meet_the_targets(tmp_path: Path) -> None:
     # Both are linear to their noise: 1e-7 rad/s per root hertz over half a second is 1e-5 % of 50 deg/s.
     assert all(float(row["fused_percent"]) < 1e-3 for row in rows)
     assert (tmp_path / "noise_psd.csv").exists()
+    # A cubic of 0.1 % at full scale bends the line a hundred times as much as the noise does, the fused one's as well.
+    with (tmp_path / "linearity_bent.csv").open(newline="") as file:
+        bent = list(csv.DictReader(file))
+    for row in bent:
+        assert float(row["mhd_ars_percent"]) > 1e-3
+        assert float(row["fused_percent"]) == pytest.approx(float(row["mhd_ars_percent"]), rel=0.05)
+    with (tmp_path / "rivals.csv").open(newline="") as file:
+        rivals = {row["name"]: row for row in csv.DictReader(file)}
+    assert [name for name in rivals if rivals[name]["band"]] == [rival.name for rival in RIVALS]
+    # Fixed gains of an order that does not lag are within the 1 % and 1 deg to 40 Hz that Zhou quotes.
+    assert float(rivals["steady_state"]["gain_percent_0.1_40_hz"]) < 1.0
+    assert float(rivals["steady_state"]["phase_deg_0.1_40_hz"]) < 1.0
+    for name in ("figure_2", "figure_7", "figure_8", "figure_9", "figure_11"):
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / f"{name}.csv").stat().st_size > 1000
     text = "\n".join(lines)
     assert "2.5 %" in text
     assert "1 dB" in text
@@ -248,3 +266,39 @@ def test_no_fused_rate_is_less_noisy_at_a_judged_line_than_the_mhd_ars() -> None
         assert abs(1.0 - G) ** 2 + abs(G) ** 2 * ratio > 1.0
     # Ours is such a handover: it costs more than nothing and less than a quarter of the power.
     assert 1.0 < np.sum(shares(np.array([f])), axis=0)[0] < 1.25
+
+
+def test_worst_errors_are_those_of_the_band() -> None:
+    freq = np.array([0.05, 0.1, 10.0, 60.0])
+    response = np.array([0.1, 1.01 * np.exp(0.01j), 0.98, 1.1 * np.exp(-0.5j)])
+    percent, decibels, phase = worst(response, freq, (0.1, 40.0))
+    assert percent == pytest.approx(2.0)
+    assert decibels == pytest.approx(-20.0 * np.log10(0.98))
+    assert phase == pytest.approx(np.degrees(0.01))
+    assert worst(response, freq, (0.1, 60.0))[2] == pytest.approx(np.degrees(0.5))
+
+
+def test_the_table_prints_what_is_quoted_and_what_is_ours() -> None:
+    rows = [(rival.name, "0.1-40 Hz", rival.gain, rival.phase, []) for rival in RIVALS]
+    text = "\n".join(rival_lines([*rows, ("kalman", "", "", "", [(0.1, 0.01, 1.15)] * 3)]))
+    for words in ("1 deg", "34 deg", "2.1 dB", "0.100 %", "1.15 deg"):
+        assert words in text
+    assert {"kalman", "wideband", "complementary", "allan_srkf"} <= set(table_filters())
+
+
+@pytest.mark.oracle
+def test_figure_2_shows_the_sensors_and_what_is_believed_of_them() -> None:
+    table = both_responses()
+    np.testing.assert_array_equal(table["mhd_ars_gain"], np.abs(mhd_response(table["frequency_hz"])))
+    band = (table["frequency_hz"] > 0.1) & (table["frequency_hz"] < 500.0)
+    ratio = table["mhd_ars_believed_gain"][band] / table["mhd_ars_gain"][band]
+    # The belief of four states was fitted: 0.14 % (docs/paper2.md).
+    assert np.abs(ratio - 1.0).max() < 0.002
+
+
+def test_figures_7_to_9_follow_a_sine_of_one_radian_per_second() -> None:
+    table = followed(lambda rate: bench_readings(rate, 1, switched_on()), 50.0)
+    assert table["t"].size > 500
+    assert np.ptp(table["t"]) == pytest.approx(3.0 / 50.0, rel=0.01)
+    assert np.abs(table["rate"]).max() == pytest.approx(np.degrees(1.0), rel=1e-3)
+    assert np.abs(table["fused"] - table["rate"]).max() < 0.02 * np.degrees(1.0)

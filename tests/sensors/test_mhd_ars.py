@@ -23,6 +23,7 @@ OPTIONS: dict[str, Any] = {
     "ring": {"width": "0.1 mm", "radius": "0.1 mm"},
     "gain": 1.1,
     "scale_factor_error": 0.01,
+    "nonlinearity": "1 %",
     "transformer": {"magnetizing_inductance": "10 uH", "source_resistance": "20 uohm"},
     "amplifier_pole": "2 kHz",
     "second_pole": "1 kHz",
@@ -134,6 +135,22 @@ def test_secondary_flow_takes_the_rate_as_it_is_and_the_linear_one_its_changes()
         sensor = sx300().model_copy(update={"channel": channel, "noise": False})
         still, turning = (sensor.sample(offset + swing, 20e3) for offset in (0.0, 2.0))
         assert (np.abs(turning - still).max() < 1e-9) == alike
+
+
+@pytest.mark.oracle
+def test_nonlinearity_is_a_cubic_over_full_scale() -> None:
+    """A sin gives A (1 + 3/4 n A^2) at its line and n A^3/4 at three times it, in parts of full scale."""
+    sensor = sx300().model_copy(update={"noise": False, "nonlinearity": 0.02})
+    n, size = 0.02, 0.5 * sensor.full_scale()
+    t = np.arange(20_000) / 20e3
+    lines = []
+    for one in (sensor, sensor.model_copy(update={"nonlinearity": 0.0})):
+        readings = one.sample(size * np.sin(2 * np.pi * 50.0 * t), 20e3)[10_000:] / one.full_scale()
+        lines.append([abs(2.0 * np.mean(readings * np.exp(-2j * np.pi * f * t[10_000:]))) for f in (50.0, 150.0)])
+    bent, plain = lines
+    # The amplifier's pole, behind it, takes 0.6 % off the third line.
+    assert bent[0] / plain[0] - 1.0 == pytest.approx(0.75 * n * plain[0] ** 2, rel=0.02)
+    assert bent[1] == pytest.approx(0.25 * n * plain[0] ** 3, rel=0.02)
 
 
 def test_input_noise_is_the_output_noise_over_the_response() -> None:

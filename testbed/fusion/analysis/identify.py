@@ -39,11 +39,14 @@ class Identified:
         Coefficients in s [rad/s], highest power first; the denominator starts with 1.
     worst : float
         Largest |fit / measured - 1| over the frequencies of the fit [-].
+    delay : float
+        Dead time behind it [s]; 0 unless it was searched.
     """
 
     numerator: FloatArray
     denominator: FloatArray
     worst: float
+    delay: float = 0.0
 
     def belief(self, *, input_noise: float = 0.0, output_noise: float = 0.0) -> SensorBelief:
         """Return it as a belief.
@@ -56,6 +59,7 @@ class Identified:
         return SensorBelief(
             numerator=tuple(self.numerator.tolist()),
             denominator=tuple(self.denominator.tolist()),
+            delay=self.delay,
             input_noise=input_noise,
             output_noise=output_noise,
         )
@@ -118,14 +122,15 @@ def identify(
     pole_pairs: int = 0,
     blind_at_dc: bool = False,
     weight: FloatArray | None = None,
+    delay: float | None = None,
 ) -> Identified:
     r"""Fit a strictly proper, stable transfer function to samples of a frequency response.
 
     .. math:: \min \sum_k w_k^2 |G(j 2 \pi f_k) / H_k - 1|^2, \quad G(s) = N(s) / D(s), \deg N < \deg D
 
-    The poles are searched (Levenberg-Marquardt in the logarithms of real poles, corners and damping, which keeps them
-    stable); for given poles N is linear least squares (variable projection, Golub and Pereyra 1973). s is scaled to the
-    middle of the band.
+    With a dead time it is G e^{-s tau}. Poles and dead time are searched (Levenberg-Marquardt in the logarithms of real
+    poles, corners and damping, which keeps them stable, and in tau); for given ones N is linear least squares (variable
+    projection, Golub and Pereyra 1973). s is scaled to the middle of the band.
 
     Parameters
     ----------
@@ -139,6 +144,8 @@ def identify(
         Force G(0) = 0, as for an MHD sensor.
     weight : ndarray, shape (n_freq,), optional
         Weight w of each sample [-]; default 1: relative errors count alike.
+    delay : float, optional
+        Where the search for a dead time begins [s], of either sign; left out there is none.
 
     Returns
     -------
@@ -168,25 +175,32 @@ def identify(
     s = 2j * np.pi * freq / unit
 
     lowest, highest = _reach(np.abs(s), real_poles, pole_pairs)
+    n_place, late = real_poles + 2 * pole_pairs, [] if delay is None else [delay * unit]
 
     def denominator(place: FloatArray) -> FloatArray:
-        return _denominator(np.clip(place, lowest, highest), real_poles)
+        return _denominator(np.clip(place[:n_place], lowest, highest), real_poles)
+
+    def in_time(place: FloatArray) -> ComplexArray:
+        return H if delay is None else H * np.exp(s * place[-1])
 
     def residual(place: FloatArray) -> FloatArray:
-        error = w * (_fitted(s, H, w, denominator(place), blind_at_dc)[1] / H - 1.0)
+        wanted = in_time(place)
+        error = w * (_fitted(s, wanted, w, denominator(place), blind_at_dc)[1] / wanted - 1.0)
         return np.concatenate([error.real, error.imag])
 
     tried = []
     for share in _SPREADS:
-        start = _start(np.abs(s), real_poles, pole_pairs, share)
+        start = np.concatenate([_start(np.abs(s), real_poles, pole_pairs, share), late])
         rounds = _ROUNDS * start.size
         tried.append(least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=rounds))
         if tried[-1].cost < _EXACT:
             break
-    D = denominator(min(tried, key=lambda one: float(one.cost)).x)
-    N, G = _fitted(s, H, w, D, blind_at_dc)
+    place = min(tried, key=lambda one: float(one.cost)).x
+    D, wanted = denominator(place), in_time(place)
+    N, G = _fitted(s, wanted, w, D, blind_at_dc)
     powers = unit ** np.arange(n_pole + 1.0)
-    return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / H - 1.0))))
+    found = 0.0 if delay is None else float(place[-1]) / unit
+    return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / wanted - 1.0))), found)
 
 
 def _reach(freq: FloatArray, real_poles: int, pole_pairs: int) -> tuple[FloatArray, FloatArray]:

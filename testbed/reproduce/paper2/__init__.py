@@ -1,4 +1,4 @@
-"""Paper 2's protocol on the simulated sensors: scale factor, linearity and noise at standstill.
+"""Paper 2's protocol on the simulated sensors: scale factor, linearity, noise at standstill, and its rivals.
 
 Jiang, Li, Liu, Tuo, Chinese Journal of Sensors and Actuators 2022 no. 9. One clock reads both sensors, which feel the
 same rate: the chain is driven by exact sines, since the table has no torque for 50 deg/s at 60 Hz.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -16,6 +16,8 @@ import numpy as np
 from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.allan_srkf import AllanSrkf, AllanSrkfParameters
 from testbed.metrics.spectra import WelchDensity, log_average
+from testbed.reproduce.paper2.figures import write_pictures
+from testbed.reproduce.paper2.rivals import RIVALS, SineProtocol, rival_lines, rival_rows
 from testbed.sensors import load_preset
 from testbed.signals import BASE_RATE_HZ
 from testbed.units import DEG
@@ -48,6 +50,10 @@ class BenchProtocol:
     warm_up, standstill : float
         Time at standstill before linearity and the record of the noise, until the gain of the gyro has settled, and
         that record's length [s].
+    sines : SineProtocol
+        Of the table of gain and phase errors.
+    bend : float
+        Nonlinearity of the MHD ARS in the second table of the linearity, over its full scale [-].
     """
 
     scale_amplitudes: tuple[float, ...] = (20.0, 30.0, 40.0, 50.0)
@@ -63,6 +69,8 @@ class BenchProtocol:
     linear_observe: float = 10.0
     warm_up: float = 300.0
     standstill: float = 600.0
+    sines: SineProtocol = field(default_factory=SineProtocol)
+    bend: float = 1e-3
 
 
 def switched_on(**parameters: Any) -> AllanSrkf:
@@ -77,7 +85,7 @@ def switched_on(**parameters: Any) -> AllanSrkf:
     return AllanSrkf(load_belief("paper2"), clock, AllanSrkfParameters(**{"start": "rest", **parameters}))
 
 
-def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, FloatArray]:
+def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf, bend: float = 0.0) -> dict[str, FloatArray]:
     """Return the readings of both sensors and the fused rate.
 
     Parameters
@@ -88,6 +96,8 @@ def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, F
         Seed of the sensors' noise.
     stage : AllanSrkf
         The filter, which stays on.
+    bend : float, optional
+        Nonlinearity of the MHD ARS [-].
 
     Returns
     -------
@@ -95,9 +105,10 @@ def bench_readings(rate: FloatArray, seed: int, stage: AllanSrkf) -> dict[str, F
         ``mems_gyro``, ``mhd_ars`` and ``fused`` [rad/s].
     """
     gyro = load_preset("crs03").model_copy(update={"sample_rate": BASE_RATE_HZ})
+    bent = load_preset("mhd03").model_copy(update={"nonlinearity": bend})
     readings = {
         "mems_gyro": gyro.start(BASE_RATE_HZ, seed, "mems_gyro").process(rate),
-        "mhd_ars": load_preset("mhd03").start(BASE_RATE_HZ, seed, "mhd_ars").process(rate),
+        "mhd_ars": bent.start(BASE_RATE_HZ, seed, "mhd_ars").process(rate),
     }
     return readings | {"fused": stage.process(readings).rate}
 
@@ -107,7 +118,9 @@ def mhd_response(freq_hz: FloatArray) -> ComplexArray:
     return load_preset("mhd03").response(freq_hz)
 
 
-def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: BenchProtocol, stage: AllanSrkf) -> list[float]:
+def amplitudes(
+    freq_hz: float, amplitude: float, seed: int, protocol: BenchProtocol, stage: AllanSrkf, bend: float = 0.0
+) -> list[float]:
     """Return the amplitude of each channel for a sine.
 
     Three periods and more are weighted by the square of Hann's window: the fused rate drifts, as the MHD ARS's noise
@@ -123,6 +136,8 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: BenchProto
         Its times.
     stage : AllanSrkf
         The filter.
+    bend : float, optional
+        Nonlinearity of the MHD ARS [-].
 
     Returns
     -------
@@ -133,7 +148,7 @@ def amplitudes(freq_hz: float, amplitude: float, seed: int, protocol: BenchProto
     periods = np.ceil(protocol.observe * freq_hz - 1e-9)
     n_time = first + round(periods / freq_hz * BASE_RATE_HZ)
     turns = 2.0 * np.pi * freq_hz * np.arange(n_time) / BASE_RATE_HZ
-    signals = bench_readings(amplitude * DEG * np.sin(turns), seed, stage)
+    signals = bench_readings(amplitude * DEG * np.sin(turns), seed, stage, bend)
     window = (1.0 - np.cos(turns[first:] / periods)) ** 2 / 1.5 if periods >= 3.0 else 1.0
     line = window * np.exp(-1j * turns[first:])
     return [float(2.0 * np.abs(np.mean(signals[name][first:] * line)) / DEG) for name in CHANNELS]
@@ -185,7 +200,7 @@ def settle_filter(seed: int, protocol: BenchProtocol, **parameters: Any) -> Call
     return lambda: copy.deepcopy(stage)
 
 
-def linearity(seed: int, protocol: BenchProtocol, **parameters: Any) -> FloatArray:
+def linearity(seed: int, protocol: BenchProtocol, bend: float = 0.0, **parameters: Any) -> FloatArray:
     """Return the largest deviation from the fitted line over the largest reading, shape (n_freq, 3) in the order of
     `CHANNELS` [-].
 
@@ -198,6 +213,8 @@ def linearity(seed: int, protocol: BenchProtocol, **parameters: Any) -> FloatArr
         Seed of the noise.
     protocol : BenchProtocol
         Grid and times.
+    bend : float, optional
+        Nonlinearity of the MHD ARS [-].
     **parameters : Any
         Of the filter.
     """
@@ -207,7 +224,9 @@ def linearity(seed: int, protocol: BenchProtocol, **parameters: Any) -> FloatArr
     rows = []
     for i, f in enumerate(protocol.linear_frequencies):
         noises = [1000 * seed + 100 * i + j for j in range(truth.size)]
-        found = np.array([amplitudes(f, a, noise, longer, settled()) for a, noise in zip(truth, noises, strict=True)])
+        found = np.array(
+            [amplitudes(f, a, noise, longer, settled(), bend) for a, noise in zip(truth, noises, strict=True)]
+        )
         slope, offset = np.polyfit(truth, found, 1)
         deviation = np.abs(found - truth[:, None] * slope - offset)
         rows.append(deviation.max(axis=0) / found[-1])
@@ -245,8 +264,8 @@ def noise_density(seed: int, protocol: BenchProtocol, **parameters: Any) -> tupl
 
 
 def report(seeds: int, out: Path, protocol: BenchProtocol | None = None, **parameters: Any) -> Iterator[str]:
-    """Run the whole protocol, write scale_factor.csv, linearity.csv and noise_psd.csv, and yield the tables line by
-    line.
+    """Run the whole protocol, write its figures and tables (scale_factor, linearity, linearity_bent, noise_psd,
+    rivals), and yield the tables line by line.
 
     Parameters
     ----------
@@ -279,10 +298,18 @@ def report(seeds: int, out: Path, protocol: BenchProtocol | None = None, **param
     yield from _table(
         out / "linearity.csv", columns, protocol.linear_frequencies, linear, "linearity, % of the largest reading"
     )
+    bent = 100.0 * np.median([linearity(seed, protocol, protocol.bend, **parameters) for seed in run], axis=0)
+    title = f"linearity with a nonlinearity of {100.0 * protocol.bend:g} % of full scale in the MHD ARS, %"
+    yield from _table(out / "linearity_bent.csv", columns, protocol.linear_frequencies, bent, title)
     noise = [noise_density(seed, protocol, **parameters) for seed in run]
     freq, density = noise[0][0], np.median([value for _, value in noise], axis=0)
     columns = ["frequency_hz", *(f"{name}_rad2_s" for name in (*CHANNELS, "mhd_ars_input_referred"))]
     _write(out / "noise_psd.csv", columns, freq, density)
+    rows = list(rival_rows(1, protocol.sines))
+    _write_rivals(out / "rivals.csv", rows)
+    yield from rival_lines(rows)
+    yield from write_pictures(lambda rate: bench_readings(rate, 1, switched_on(**parameters)), freq, density, out)
+    yield ""
     yield from _claims(protocol, scale[:, 2], linear, freq, density)
 
 
@@ -336,3 +363,14 @@ def _write(path: Path, columns: list[str], first: tuple[float, ...] | FloatArray
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows([float(key), *map(float, row)] for key, row in zip(first, values, strict=True))
+
+
+def _write_rivals(path: Path, rows: list[tuple[str, str, str, str, list[tuple[float, float, float]]]]) -> None:
+    bands = [f"{rival.band[0]:g}_{rival.band[1]:g}_hz" for rival in RIVALS]
+    errors = [f"{error}_{band}" for band in bands for error in ("gain_percent", "gain_db", "phase_deg")]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["name", "band", "gain_quoted", "phase_quoted", *errors])
+        for *words, ours in rows:
+            values = [value for each in ours for value in each]
+            writer.writerow([*words, *map(str, values), *[""] * (len(errors) - len(values))])

@@ -1,0 +1,138 @@
+"""The scale of a sweep: what a case costs beside its simulation, how cost grows, what a second worker is worth.
+
+- Overhead: CPU seconds a case of a sweep whose cases are not played (their rows are ready made), from 10 cases to
+  --cases: agenda, rows, store, page. What checking a case takes before the first one runs is printed beside it.
+- Length: CPU seconds of `testbed.evaluate` from 1 s to --seconds; what a further simulated second costs stays the same.
+- Workers: wall clock of a sweep of 40 cases with one worker over that with two, both as clusters (on a machine with two
+  free cores), and the peak resident set of a worker after 20 cases and after 40.
+
+From these follows, on paper, what a million cases on 100 machines take.
+Run: python benchmarks/bench_sweep.py [--cases 10000] [--seconds 3600] [--without-workers]
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from promises import Promise, conclude
+
+import testbed
+from testbed.campaigns import engine
+from testbed.campaigns.agenda import Agenda, Task, play
+from testbed.campaigns.study import Study, load_study
+from testbed.campaigns.sweep import sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+BASE = """\
+name: base
+seed: 1
+duration: {seconds:g} s
+settle: 0.5 s
+turntable: {{engine: auto}}
+motion: [{{sine: {{frequency: 10 Hz, rate: 1 deg/s}}}}]
+sensors: {{mhd_ars: {{preset: sx300}}, mems_gyro: {{preset: adis16505_filtered}}}}
+fusion: {{kalman: {{}}, arw_shakf: {{}}}}
+"""
+
+
+def study_of(folder: Path, cases: int, seconds: float = 1.0) -> Study:
+    """Return a study of one axis."""
+    (folder / "base.yaml").write_text(BASE.format(seconds=seconds))
+    axis = f"{{linear: [1 Hz, 20 Hz], points: {cases}}}"
+    (folder / "study.yaml").write_text(f"name: scale\nbase: base.yaml\nvary: {{motion.0.sine.frequency: {axis}}}\n")
+    return load_study(folder / "study.yaml")
+
+
+def longer(scenario: testbed.Scenario, seconds: float) -> testbed.Scenario:
+    """Return the scenario with another duration."""
+    return scenario.with_(duration=f"{seconds:g} s")
+
+
+def cpu(task: Callable[[], object]) -> float:
+    """Return the CPU time of a call [s]."""
+    begin = time.process_time()
+    task()
+    return time.process_time() - begin
+
+
+def overhead_ms(folder: Path, study: Study, cases: int) -> float:
+    """Return what a case costs beside its simulation: the first one's rows stand for those of all [ms]."""
+    many = replace(study, cases=tuple(replace(study.cases[0], number=k) for k in range(cases)))
+    ready = play(Task(study.cases[0], 0, study.seeds))
+
+    def instant(task: Task) -> list[dict[str, Any]]:
+        # As `testbed.campaigns.rows` makes them, hash and all.
+        return [{**row, "case": task.case.number, "scenario_sha256": task.case.sha256} for row in ready]
+
+    real, engine.play = engine.play, instant
+    try:
+        return 1e3 * cpu(lambda: sweep(many, out=folder / f"instant_{cases}")) / cases
+    finally:
+        engine.play = real
+
+
+def clustered(study: Study, workers: int) -> tuple[float, float]:
+    """Return the wall clock of a sweep on a cluster [s], and the largest resident set of any worker so far [MB]."""
+    begin = time.monotonic()
+    engine.play_on_cluster(Agenda(study, ()), lambda _task, _rows: None, workers=workers)
+    return time.monotonic() - begin, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0
+
+
+def main() -> None:
+    """Print the costs and the promises."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--without-workers", action="store_true")
+    given = parser.parse_args()
+    promises = []
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        check = cpu(lambda: study_of(folder, 20)) / 20
+        study = study_of(folder, 2)
+        overhead_ms(folder, study, 1)
+        counts = [n for n in (10, 100, 1000, 10_000) if n <= given.cases]
+        costs = {n: overhead_ms(folder, study, n) for n in counts}
+        for n, cost in costs.items():
+            print(f"{n:6d} cases: {cost:.2f} ms a case beside its simulation")
+        print(f"checking a case before the first one runs: {1e3 * check:.0f} ms")
+        promises.append(Promise("overhead of a case [ms]", 5.0, max(costs[n] for n in counts)))
+        scenario = study.cases[0].scenario
+        testbed.evaluate(scenario, [1])
+        lengths = [s for s in (1.0, 10.0, 60.0, 600.0, 3600.0) if s <= given.seconds]
+        spent = {s: min(cpu(lambda s=s: testbed.evaluate(longer(scenario, s), [1])) for _ in range(2)) for s in lengths}
+        further = [(spent[b] - spent[a]) / (b - a) for a, b in pairwise(lengths)]
+        for (a, b), cost in zip(pairwise(lengths), further, strict=True):
+            print(f"from {a:g} s to {b:g} s: {1e3 * cost:.1f} ms of processor time per simulated second")
+        print(f"a case of 1 s, design and optimum included: {1e3 * spent[1.0]:.0f} ms")
+        what = f"a second of {lengths[-1]:g} s over one of {lengths[1]:g} s [-]"
+        promises.append(Promise(what, 1.2, further[-1] / further[0]))
+        if not given.without_workers:
+            forty, twenty = study_of(folder, 40, 4.0), study_of(folder, 20, 4.0)
+            _, few = clustered(twenty, 1)
+            one, _ = clustered(forty, 1)
+            two, most = clustered(forty, 2)
+            print(f"40 cases of 4 s: one worker {one:.1f} s, two {two:.1f} s; a worker held {most:.0f} MB at the most")
+            promises += [
+                Promise("one worker over two, 40 cases of 4 s [-]", 1.8, one / two, at_most=False),
+                Promise("peak memory of a worker [MB]", 400.0, most),
+                Promise("memory of a worker after 40 cases over that after 20 [-]", 1.1, most / few),
+            ]
+        each = spent[10.0] + 1e-3 * costs[counts[-1]]
+        print(f"on paper: 1e6 cases of 10 s, one seed, on 100 machines of 8 cores: {1e6 * each / 800 / 3600:.2f} h")
+        print(f"  of which the parent, alone: {1e6 * 1e-3 * costs[counts[-1]] / 3600:.2f} h for rows and store,")
+        print(f"  and {1e6 * check / 3600:.1f} h to check the cases, in 50 studies of 20 000")
+    conclude(*promises)
+
+
+if __name__ == "__main__":
+    main()
