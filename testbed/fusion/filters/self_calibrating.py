@@ -22,6 +22,7 @@ from testbed.units import DEG, PositiveDuration
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from testbed.fusion.model import FusionModel
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
@@ -163,6 +164,11 @@ class SelfCalibrating(BlockFilter):
         self._filled = 0
         # Of the last seconds the readings, and the state before them.
         self._past: deque[tuple[dict[str, Any], FloatArray]] = deque(maxlen=_AGAIN)
+
+    @property
+    def model(self) -> FusionModel:
+        """The augmented model of the filter inside, as it is now."""
+        return self._inner.model
 
     @property
     def step_seconds(self) -> float:
