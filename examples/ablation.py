@@ -84,7 +84,7 @@ def run(
     z: Mapping[str, np.ndarray], rate: np.ndarray, first: int, name: str, belief: str = "eq39", **own: Any
 ) -> tuple[float, float]:
     """Return rms(error) [deg/s] and rms(error)/rms(std) [-] of a filter from sample `first` on."""
-    block = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", **own)
+    block = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", verdict=False, **own)
     error, std = (np.sqrt(np.mean(part[first:] ** 2)) for part in (block.rate - rate, block.std))
     return float(error) / DEG, float(error / std)
 

@@ -55,7 +55,7 @@ def errors(signal: str, seed: int) -> dict[str, tuple[float, float]]:
     runs["steady_state, for it"] = "steady_state", {"frequency": strongest, "amplitude": amplitude}
     settled, found = round(SETTLE * RATES["mhd_ars"]), {}
     for label, (name, own) in runs.items():
-        block = estimate(name, readings, sample_rate_hz=RATES, belief=BELIEF, start="rest", **own)
+        block = estimate(name, readings, sample_rate_hz=RATES, belief=BELIEF, start="rest", verdict=False, **own)
         error = (block.rate - rate)[settled:]
         found[label] = tuple(float(np.sqrt(np.mean(values**2))) / DEG for values in (error, block.std[settled:]))
     return found

@@ -75,7 +75,7 @@ def trial(freq_hz: float, amplitude: float, order: int) -> Callable[[float], boo
     z, half = readings(rate, SEED), rate.size // 2
 
     def failed(q: float) -> bool:
-        error = estimate("shakf", z, sample_rate_hz=RATES, start="rest", order=order, q=q).rate - rate
+        error = estimate("shakf", z, sample_rate_hz=RATES, start="rest", order=order, q=q, verdict=False).rate - rate
         return bool(np.mean(error[half:] ** 2) > FAILED**2 * np.mean(rate[half:] ** 2))
 
     return failed

@@ -10,7 +10,8 @@ platform.
 Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about 40
 s of processor time for each signal with ten seeds of 20 s. ``--mismatch`` prints the table of wrong beliefs instead,
 ``--change`` the one of changing signals. ``--filters`` and ``--restart`` give `wideband` other parameters than its own
-in the first and the last, to see what they are for.
+in the first and the last, to see what they are for. ``--start unknown`` lets no filter know that the table rests at
+first.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import argparse
 import csv
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -83,17 +84,32 @@ def readings(rate: FloatArray, seed: int, *, noise: bool = True) -> dict[str, Fl
     }
 
 
+def error_and_claim(
+    name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
+) -> tuple[float, float]:
+    """Return the error of a filter over the second half, and the standard deviation that it claims there [deg/s]."""
+    block = estimate(name, z, sample_rate_hz=RATES, belief=belief, verdict=False, **{"start": "rest", **own})
+    late = slice(rate.size // 2, None)
+    error, claim = (float(np.sqrt(np.mean(of[late] ** 2)) / DEG) for of in (block.rate - rate, block.std))
+    return error, claim
+
+
 def rmse(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
 ) -> float:
     """Return the error of a filter over the second half [deg/s]."""
-    error = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", **own).rate - rate
-    return float(np.sqrt(np.mean(error[rate.size // 2 :] ** 2)) / DEG)
+    return error_and_claim(name, z, rate, belief, **own)[0]
 
 
-def fixed(z: dict[str, FloatArray], rate: FloatArray, decade: int, belief: dict[str, SensorBelief] = BELIEF) -> float:
+def fixed(
+    z: dict[str, FloatArray],
+    rate: FloatArray,
+    decade: int,
+    belief: dict[str, SensorBelief] = BELIEF,
+    start: str = "rest",
+) -> float:
     """Return the error of the order-3 filter with q = 10^decade (deg/s)^2/s^5 [deg/s]."""
-    return rmse("kalman", z, rate, belief, order=3, q=10.0**decade * DEG**2)
+    return rmse("kalman", z, rate, belief, order=3, q=10.0**decade * DEG**2, start=start)
 
 
 def best_fixed(errors: Callable[[int], FloatArray], decade: int) -> tuple[int, FloatArray]:
@@ -111,7 +127,8 @@ def best_fixed(errors: Callable[[int], FloatArray], decade: int) -> tuple[int, F
 class Judgement:
     """Errors of `wideband` and of the best fixed filter for one signal [deg/s].
 
-    `ratio` is the median of the ratios of the pairs with the same noise, `ratio_of_medians` what it says.
+    `ratio` is the median of the ratios of the pairs with the same noise, `ratio_of_medians` what it says, `claim` the
+    root mean square that `wideband` claims over its error, over all seeds.
     """
 
     signal: str
@@ -122,36 +139,44 @@ class Judgement:
     fixed_log10_q: int
     ratio: float
     ratio_of_medians: float
+    claim: float
 
 
-def judge(label: str, seeds: Sequence[int], duration: float, **own: float) -> Judgement:
-    """Judge one signal of `signals` over paired seeds; `own` are parameters of `wideband`."""
+def judge(label: str, seeds: Sequence[int], duration: float, start: str = "rest", **own: float) -> Judgement:
+    """Judge one signal of `signals` over paired seeds from one start; `own` are parameters of `wideband`."""
     motions, decade = signals()[label]
     rate = truth(motions, duration)
     records = [readings(rate, seed) for seed in seeds]
-    ours = np.array([rmse("wideband", z, rate, BELIEF, **own) for z in records])
-    at, theirs = best_fixed(lambda d: np.array([fixed(z, rate, d) for z in records]), decade)
+    pairs = [error_and_claim("wideband", z, rate, BELIEF, start=start, **own) for z in records]
+    ours, claims = np.array(pairs).T
+    at, theirs = best_fixed(lambda d: np.array([fixed(z, rate, d, start=start) for z in records]), decade)
     middle, other = float(np.median(ours)), float(np.median(theirs))
     ratio = float(np.median(ours / theirs))
-    return Judgement(label, len(seeds), middle, float(ours.max()), other, at, ratio, middle / other)
+    claim = float(np.sqrt(np.mean(claims**2) / np.mean(ours**2)))
+    return Judgement(label, len(seeds), middle, float(ours.max()), other, at, ratio, middle / other, claim)
 
 
 def against_fixed(
-    labels: Sequence[str], seeds: Sequence[int], duration: float, target: Path | None, own: dict[str, float]
+    labels: Sequence[str],
+    seeds: Sequence[int],
+    duration: float,
+    target: Path | None,
+    start: str,
+    own: dict[str, float],
 ) -> None:
     """Print a line per signal, and write them to a file."""
     print(
-        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians   deg/s, "
+        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians  claim   deg/s, start {start}, "
         f"{len(seeds)} seeds, {duration:g} s"
     )
     rows = []
     for label in labels:
-        row = judge(label, seeds, duration, **own)
+        row = judge(label, seeds, duration, start, **own)
         rows.append(asdict(row))
         met = max(row.ratio, row.ratio_of_medians) <= RATIO and row.wideband <= TARGETS.get(label, np.inf)
         print(
             f"{label:>16}{row.wideband:9.5f}{row.largest:9.5f}{row.fixed:9.5f}{'1e' + str(row.fixed_log10_q):>8}"
-            f"{row.ratio:8.3f}{row.ratio_of_medians:12.3f}   {'met' if met else 'MISSED'}",
+            f"{row.ratio:8.3f}{row.ratio_of_medians:12.3f}{row.claim:7.2f}   {'met' if met else 'MISSED'}",
             flush=True,
         )
     if target:
@@ -238,8 +263,9 @@ def change_errors(label: str, seed: int, duration: float = 10.0, **own: float) -
     before, after = (truth([sine(*line)], duration) for line in CHANGES[label])
     half, rest = before.size // 2, before.size // 2 + round(AFTER * RATES["mhd_ars"])
     rate = np.concatenate([before[:half], after[half:]])
+    always: dict[str, Any] = {"start": "rest", "verdict": False}
     errors = [
-        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, start="rest", **own).rate - one)
+        (estimate("wideband", readings(one, seed), sample_rate_hz=RATES, belief=BELIEF, **always, **own).rate - one)
         / DEG
         for one in (rate, after)
     ]
@@ -269,6 +295,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10, help="how many")
     parser.add_argument("--duration", type=float, default=20.0, help="of a run in s")
     parser.add_argument("--signals", nargs="+", default=list(signals()), choices=list(signals()), metavar="SIGNAL")
+    parser.add_argument("--start", choices=("rest", "unknown"), default="rest", help="what both filters know of it")
     parser.add_argument("--csv", type=Path, help="where to write the table")
     parser.add_argument("--filters", type=int, help="in the bank of `wideband`, over the same decades")
     parser.add_argument("--restart", type=float, help="of `wideband`; 1e12 is never")
@@ -283,7 +310,7 @@ def main() -> None:
     elif given.change:
         under_change(seeds, own)
     else:
-        against_fixed(given.signals, seeds, given.duration, given.csv, own)
+        against_fixed(given.signals, seeds, given.duration, given.csv, given.start, own)
 
 
 if __name__ == "__main__":

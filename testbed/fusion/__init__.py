@@ -32,6 +32,7 @@ FILTERS = {
     "blending": "testbed.fusion.filters.blending:Blending",
     "wideband": "testbed.fusion.filters.wideband:Wideband",
     "allan_srkf": "testbed.fusion.filters.allan_srkf:AllanSrkf",
+    "self_calibrating": "testbed.fusion.filters.self_calibrating:SelfCalibrating",
     "vb_akf": "testbed.fusion.filters.vb_akf:VbAkf",
     "imm": "testbed.fusion.filters.imm:Imm",
 }

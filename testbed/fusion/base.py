@@ -42,6 +42,7 @@ _UNITS = {
     "R": "rad^2/s^2",
     "N": "rad^2/s^2",
     "Q_rate": "rad^2/s^2",
+    "delay": "s",
 }
 
 

@@ -35,6 +35,7 @@ NAMED = {
     "fusion/allan_srkf": "#9a7398",
     "fusion/vb_akf": "#c85a70",
     "fusion/imm": "#4f934d",
+    "fusion/self_calibrating": "#7d7fb5",
 }
 # Hues of names that do not ship, in turns from red on.
 _HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42), "columns": (0.0, 1.0)}

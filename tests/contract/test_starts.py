@@ -41,7 +41,8 @@ def test_a_declared_rest_is_a_start_at_the_rate_of_rest(name: str) -> None:
     rate, readings = record(lambda t: np.full(t.size, 6e-5), 0.2, 1, {"mhd_ars": {"noise": False}})
     readings["mems_gyro"] = np.full(readings["mems_gyro"].size, 6e-5 * 15.626 / 15.444)
     told, unknown = (
-        estimate(named(name), readings, sample_rate_hz=RATES, belief="eq39", start=start, rest_rate=6e-5)
+        # Without noise the readings repeat, which the verdict would name.
+        estimate(named(name), readings, sample_rate_hz=RATES, belief="eq39", start=start, rest_rate=6e-5, verdict=False)
         for start in ("rest", "unknown")
     )
     assert np.max(np.abs(told.rate - rate)) < 1e-3 * 6e-5

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
-from testbed.fusion.analysis.paths import Grid, Trace, dynamics
+from testbed.fusion.analysis.paths import Grid, Trace
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -104,8 +104,8 @@ class Pair:
         self._used = (freq >= _LOWEST_HZ) & (freq <= _HIGHEST_SHARE * fs)
         self._freq = freq[self._used]
         self._octave = np.floor(np.log2(self._freq)).astype(int)
-        self._a_noise = np.abs(dynamics(clean.belief, self._freq)) ** 2 * self.grid.noise(noisy, self._freq)
-        self._c_noise = np.abs(dynamics(noisy.belief, self._freq)) ** 2 * self.grid.noise(clean, self._freq)
+        self._a_noise = np.abs(clean.belief.response(self._freq)) ** 2 * self.grid.noise(noisy, self._freq)
+        self._c_noise = np.abs(noisy.belief.response(self._freq)) ** 2 * self.grid.noise(clean, self._freq)
         self.c = self.grid.through(clean, noisy.belief)
 
     def put_right(self, offset: float, rate: float, middle: float) -> Trace:
@@ -122,7 +122,7 @@ class Pair:
         fs = self.grid.sample_rate_hz
         freq = np.geomspace(1e-6, 0.5 * fs * float(np.sum(weight**2)), 200)
         pairs = (self.noisy, self.clean.belief), (self.clean, self.noisy.belief)
-        density = sum(np.abs(dynamics(by, freq)) ** 2 * one.reading_noise(freq) for one, by in pairs)
+        density = sum(np.abs(by.response(freq)) ** 2 * one.reading_noise(freq) for one, by in pairs)
         return math.sqrt(2.0 * float(np.trapezoid(density, freq)))
 
     def agreement(self) -> Agreement:

@@ -123,4 +123,5 @@ def compared(noisy: tuple[str, Trace], clean: tuple[str, Trace], clean_noise: No
 
 
 def _without_repeats(trace: Trace) -> Trace:
-    return replace(trace, z=np.where(repeated(trace), math.nan, trace.z))
+    """Return a trace with what filters take off it: its believed bias, and readings that are stuck."""
+    return replace(trace, z=np.where(repeated(trace), math.nan, trace.z - trace.belief.bias))

@@ -11,7 +11,6 @@ from scipy.fft import rfft, rfftfreq
 from scipy.signal import detrend, welch
 
 from testbed.fusion.analysis.finding import QUANTILE, Finding
-from testbed.fusion.analysis.paths import dynamics
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -102,7 +101,7 @@ def noise_beside(pair: Pair, a: FloatArray) -> NoiseRatio | None:
     left = (own - np.abs(cross) ** 2 / np.maximum(clean, 1e-300)) / (1.0 - 0.5 / count)
     freq = rfftfreq(n, 1.0 / fs)
     f = np.maximum(freq, freq[1])
-    believed = np.abs(dynamics(pair.clean.belief, f)) ** 2 * pair.grid.noise(pair.noisy, f)
+    believed = np.abs(pair.clean.belief.response(f)) ** 2 * pair.grid.noise(pair.noisy, f)
     return _banded(freq, left, believed, count)
 
 

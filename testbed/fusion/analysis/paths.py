@@ -16,13 +16,11 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.interpolate import CubicSpline
 
-from testbed.signals import transfer
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from testbed.fusion.belief import SensorBelief
-    from testbed.signals import ComplexArray, FloatArray
+    from testbed.signals import FloatArray
 
 # What the comparison is made at, at the most [Hz].
 _GRID_HZ = 1000.0
@@ -65,14 +63,9 @@ class Trace:
         step = (one.resolution or 0.0) ** 2 / 12.0 * self.interval
         walk = (one.rate_random_walk / (2.0 * np.pi * freq_hz)) ** 2
         inner = one.input_noise**2 + one.inner_slow_density(freq_hz) + walk
-        power = np.abs(dynamics(one, freq_hz)) ** 2
+        power = np.abs(one.response(freq_hz)) ** 2
         density: FloatArray = power * inner + one.output_noise**2 + one.outer_slow_density(freq_hz) + step
         return density
-
-
-def dynamics(belief: SensorBelief, freq_hz: FloatArray) -> ComplexArray:
-    """Return the believed response of a sensor [-], complex, shape (n_freq,), for frequencies of that shape [Hz]."""
-    return transfer(list(belief.numerator), list(belief.denominator), freq_hz)
 
 
 class Grid:
@@ -144,7 +137,7 @@ class Grid:
         p = self._pad
         ends = 2.0 * value[0] - value[p:0:-1], 2.0 * value[-1] - value[-2 : -p - 2 : -1]
         spectrum = rfft(np.concatenate([ends[0], value, ends[1]]), self._n)
-        spectrum *= dynamics(other, self._freq) / _droop(self._freq, many, trace.interval)
+        spectrum *= other.response(self._freq) / _droop(self._freq, many, trace.interval)
         passed = level * other.numerator[-1] / other.denominator[-1]
         result: FloatArray = irfft(spectrum, self._n)[p : p + self.t.size] + passed
         return result

@@ -11,7 +11,7 @@ from testbed.fusion.analysis.comparison import Compared, compared
 from testbed.fusion.analysis.continuity import continuity_findings
 from testbed.fusion.analysis.finding import Finding, Verdict
 from testbed.fusion.analysis.floor import loudness_findings, own_noise
-from testbed.fusion.analysis.paths import Trace, dynamics
+from testbed.fusion.analysis.paths import Trace
 from testbed.fusion.belief import check_belief
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _traces(
 
 def _input_noise(trace: Trace) -> float:
     """Return the mean logarithm of the believed noise, referred to the rate."""
-    gain = np.abs(dynamics(trace.belief, _BAND_HZ))
+    gain = np.abs(trace.belief.response(_BAND_HZ))
     density = trace.reading_noise(_BAND_HZ) / np.maximum(gain, 1e-30) ** 2
     return float(np.mean(np.log(np.maximum(density, 1e-300))))
 

@@ -104,7 +104,7 @@ def test_most_go_in_lanes(name, rng, monkeypatch):
     """All but those of their own fate: the sequential kernel is not asked for them."""
     lanes = filters(name, 5)
     together, asked = Together(lanes[0]), []
-    monkeypatch.setattr(type(lanes[0]), "estimated", lambda self, Z, gated: asked.append(self))
+    monkeypatch.setattr(type(lanes[0]), "estimated", lambda self, *_received: asked.append(self))
     given = [readings(rng, 200) for _ in lanes]
     given[3]["mhd_ars"][9] = np.nan
     together.process(lanes, given)

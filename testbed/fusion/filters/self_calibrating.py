@@ -1,0 +1,267 @@
+"""A filter that corrects gain and delay of one of its two sensors while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from copy import copy
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
+
+from testbed.fusion.analysis.calibration import Calibrated, Calibration
+from testbed.fusion.base import BlockFilter, CommonParameters, Rows
+from testbed.fusion.belief import SensorBelief
+from testbed.fusion.kernels.covariance import HEADER_ROWS
+from testbed.fusion.model_filter import FilterParameters, ModelFilter
+from testbed.fusion.realisation import Realisation
+from testbed.parts import resolve
+from testbed.units import DEG, PositiveDuration
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from testbed.fusion.model import FusionModel
+    from testbed.parts import Part
+    from testbed.signals import FloatArray
+
+# What goes on with another belief from the state that it has, and the attributes that are that state.
+_INNER = {
+    "kalman": ("testbed.fusion.filters.kalman:Kalman", ("_x", "_P", "_started")),
+    "wideband": ("testbed.fusion.filters.wideband:Wideband", ("_x", "_P", "_score", "_watch")),
+}
+# The lag of a sensor without any [s], so that there always is a state of it. The estimate leads by it: 10 us would cost
+# 15 % on the jitter of a wheel.
+_LEAST_LAG = 1e-6
+# From this change of gain [-] and lag [s] on the last seconds, as many at the most, are filtered again.
+_GAIN_CHANGE, _LAG_CHANGE, _AGAIN = 5e-4, 2e-5, 10
+_OWN = ("gain", "gain_std", "delay", "delay_std")
+
+
+class LateBelief(SensorBelief):
+    """A belief with one pole more behind the dynamics, which stays one state whatever its lag is.
+
+    Parameters
+    ----------
+    lag : float
+        Its time constant [s].
+    """
+
+    lag: PositiveDuration = _LEAST_LAG
+
+    @property
+    def n_state(self) -> int:
+        """Number of states of the realisation, the last one that of the lag."""
+        return super().n_state + 1
+
+    def realisation(self) -> Realisation:
+        """Return the realisation of the dynamics, then the lag: y' = (C x + D u - y) / lag."""
+        one = super().realisation()
+        n = one.B.size
+        A = np.zeros((n + 1, n + 1))
+        A[:n, :n], A[n, :n], A[n, n] = one.A, one.C / self.lag, -1.0 / self.lag
+        C = np.zeros(n + 1)
+        C[n] = 1.0
+        return Realisation(A, np.append(one.B, one.D / self.lag), C, 0.0)
+
+
+class SelfCalibratingParameters(CommonParameters):
+    """Parameters of `SelfCalibrating`.
+
+    Parameters
+    ----------
+    filter : mapping
+        The filter that estimates, by its type, with its parameters: ``{wideband: {}}`` or ``{kalman: {order: 3}}``.
+    gain_std : float
+        How far from one the gain may be, as a standard deviation [-].
+    delay_std : float
+        How late one sensor may be against the other, likewise [s].
+    """
+
+    filter: dict[str, dict[str, Any]] = Field(default={"wideband": {}}, min_length=1, max_length=1)
+    gain_std: Annotated[float, Field(gt=0.0, le=1.0)] = 0.01
+    delay_std: PositiveDuration = 5e-4
+
+    @field_validator("filter")
+    @classmethod
+    def _check_filter(cls, value: dict[str, dict[str, Any]], info: ValidationInfo) -> dict[str, dict[str, Any]]:
+        ((name, given),) = value.items()
+        if name not in _INNER:
+            msg = f"expected one of {list(_INNER)}, which can go on with another belief, got {name!r}"
+            raise ValueError(msg)
+        try:
+            inner = _inner_class(name).Parameters.model_validate(given, context=info.context)
+        except ValidationError as error:
+            msg = "; ".join(f"{name}.{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+            raise ValueError(msg) from error
+        if isinstance(inner, FilterParameters) and inner.order == 1:
+            msg = f"{name}: expected order 2 or 3, since one of order 1 cannot extrapolate over a delay"
+            raise ValueError(msg)
+        return value
+
+
+class SelfCalibrating(BlockFilter):
+    r"""Another filter, whose belief in gain and delay follows what its two sensors say of each other.
+
+    Second after second gain and delay of the noisy sensor against the clean one are estimated from all readings so far
+    (`testbed.fusion.analysis.calibration`), and hold for the next second. The readings of one sensor are divided by the
+    gain, of the one that is blind to a constant rate; the delay is a pole behind the dynamics of whichever sensor is
+    late. After a change the filter goes once more through the last ten seconds. What both sensors share cannot be seen.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Dynamics and noise of two sensors, one of which sees a constant rate.
+    sample_rate_hz : mapping of str to float
+        Rate of each sensor [Hz].
+    parameters : SelfCalibratingParameters
+        The filter, and the prior.
+
+    Raises
+    ------
+    ValueError
+        If there are not two sensors, or the filter refuses belief or rates.
+
+    References
+    ----------
+    Soderstrom, Errors-in-Variables Methods in System Identification (2018); Baranchik, Annals of Mathematical
+    Statistics 41 (1970) 642-645 (positive-part shrinkage).
+    """
+
+    Parameters: ClassVar[type[Part]] = SelfCalibratingParameters
+    needs_both = True
+    caution = "what both sensors share, a gain or a delay, cannot be seen"
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
+
+    def __init__(
+        self,
+        belief: Mapping[str, SensorBelief],
+        sample_rate_hz: Mapping[str, float],
+        parameters: SelfCalibratingParameters,
+    ) -> None:
+        super().__init__(belief, sample_rate_hz, parameters)
+        ((self._name, given),) = parameters.filter.items()
+        common = parameters.model_dump(include={"start", "rest_rate"})
+        self._inner_parameters = _inner_class(self._name).Parameters(**{**common, **given, "gate": False})
+        self._rates = dict(sample_rate_hz)
+        self._belief = {name: LateBelief(**belief[name].model_dump() | {"lag": _LEAST_LAG}) for name in sample_rate_hz}
+        self._inner = self._built(self._belief)
+        self.rows = Rows((*_OWN, *self._inner.rows.once), self._inner.rows.per_sensor)
+        self._noisy, self._clean = _roles(belief, list(sample_rate_hz))
+        blind = belief[self.schedule.sensors[self._noisy]].sees_constant
+        # Whose readings are divided, and by the gain or its inverse.
+        self._scaled, self._power = (self._clean, -1.0) if blind else (self._noisy, 1.0)
+        strides = self.schedule.strides
+        self._stride = max(strides)
+        slow_hz = self.schedule.sample_rate_hz / self._stride
+        one, other = (belief[self.schedule.sensors[i]] for i in (self._noisy, self._clean))
+        means = self._stride // strides[self._noisy], self._stride // strides[self._clean]
+        self._calibration = Calibration(one, other, slow_hz, means, parameters.gain_std, parameters.delay_std)
+        self._known = Calibrated(1.0, 0.0, parameters.gain_std, parameters.delay_std)
+        self._gain, self._lags = 1.0, np.full(2, _LEAST_LAG)
+        self._second = np.full((2, round(slow_hz) * self._stride), math.nan)
+        self._filled = 0
+        # Of the last seconds the readings, and the state before them.
+        self._past: deque[tuple[dict[str, Any], FloatArray]] = deque(maxlen=_AGAIN)
+
+    @property
+    def model(self) -> FusionModel:
+        """The augmented model of the filter inside, as it is now."""
+        return self._inner.model
+
+    @property
+    def step_seconds(self) -> float:
+        """About how long a step takes, compiled, on a core of 2020 [s]: that of the filter inside."""
+        return self._inner.step_seconds + 2e-8
+
+    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
+        n, at = Z.shape[1], 0
+        while at < n:
+            if self._filled == 0:
+                self._past.append((self._state(), np.empty(0)))
+            part = slice(at, min(n, at + self._second.shape[1] - self._filled))
+            length = part.stop - part.start
+            self._second[:, self._filled : self._filled + length] = Z[:, part]
+            self._filled, at = self._filled + length, part.stop
+            self._estimate(Z[:, part], out[:, part])
+            if self._filled == self._second.shape[1]:
+                self._past[-1] = self._past[-1][0], self._second.copy()
+                self._learn()
+                self._filled = 0
+
+    def _estimate(self, Z: FloatArray, out: FloatArray) -> None:
+        made = self._filtered(Z)
+        out[:HEADER_ROWS], out[HEADER_ROWS + len(_OWN) :] = made[:HEADER_ROWS], made[HEADER_ROWS:]
+        known = self._known
+        own = (known.gain, known.gain_std, known.delay, known.delay_std)
+        out[HEADER_ROWS : HEADER_ROWS + len(_OWN)] = np.array(own)[:, None]
+
+    def _filtered(self, Z: FloatArray) -> FloatArray:
+        """Return what the filter inside gives for readings, corrected by the gain."""
+        corrected = Z.copy()
+        corrected[self._scaled] /= self._gain**self._power
+        corrected.flags.writeable = False
+        made = np.full((HEADER_ROWS + len(self._inner.rows.names(self.schedule.sensors)), Z.shape[1]), np.nan)
+        self._inner._advance(corrected, made)
+        return made
+
+    def _learn(self) -> None:
+        """Take the second that is full, and what it says of gain and delay for the next one.
+
+        What the slow states learned from the last seconds under another gain or delay they would keep for half a
+        minute: after a change the filter goes through those seconds again.
+        """
+        self._known = self._calibration.add(*(self._second_of(i) for i in (self._noisy, self._clean)))
+        gain, delay = self._known.applied()
+        lags = np.full(2, _LEAST_LAG)
+        lags[self._noisy if delay > 0.0 else self._clean] += abs(delay)
+        change = float(np.max(np.abs(lags - self._lags)))
+        if abs(gain - self._gain) < _GAIN_CHANGE and change < _LAG_CHANGE:
+            return
+        self._gain, self._lags = gain, lags
+        belief = {
+            name: self._belief[name].model_copy(update={"lag": float(lag)})
+            for name, lag in zip(self.schedule.sensors, lags, strict=True)
+        }
+        past = list(self._past)
+        self._inner = self._built(belief)
+        for name, value in past[0][0].items():
+            setattr(self._inner, name, value)
+        self._past.clear()
+        for _, Z in past:
+            self._past.append((self._state(), Z))
+            self._filtered(Z)
+
+    def _state(self) -> dict[str, Any]:
+        return {name: copy(getattr(self._inner, name)) for name in _INNER[self._name][1]}
+
+    def _second_of(self, which: int) -> FloatArray:
+        """Return the readings of a sensor in the second at the slow rate, the mean of those of a fast one [rad/s]."""
+        z, stride = self._second[which], self.schedule.strides[which]
+        due = z[::stride]
+        due = np.where(np.isfinite(due), due, math.nan)
+        many = self._stride // stride
+        means: FloatArray = due.reshape(-1, many).mean(axis=1)
+        return means
+
+    def _built(self, belief: Mapping[str, SensorBelief]) -> ModelFilter:
+        filter_class = _inner_class(self._name)
+        inner: ModelFilter = filter_class(belief, self._rates, self._inner_parameters)
+        return inner
+
+
+def _inner_class(name: str) -> type[Any]:
+    return resolve("filter", name, {key: place for key, (place, _) in _INNER.items()})
+
+
+def _roles(belief: Mapping[str, SensorBelief], sensors: list[str]) -> tuple[int, int]:
+    """Return the numbers of the noisy and of the clean sensor, by their noise referred to the rate from 1 to 30 Hz."""
+    freq = np.geomspace(1.0, 30.0, 16)
+    loud = []
+    for name in sensors:
+        one = belief[name]
+        gain = np.maximum(np.abs(one.response(freq)), 1e-30) ** 2
+        density = one.input_noise**2 + one.output_noise**2 / gain
+        loud.append(float(np.mean(np.log(np.maximum(density, 1e-300)))))
+    return int(np.argmax(loud)), int(np.argmin(loud))
