@@ -40,6 +40,8 @@ EXAMPLES = [
     "testbed.models.motions",
     "testbed.models.turntable.turntable",
     "testbed.notebook.run",
+    "testbed.playback.export",
+    "testbed.playback.replay",
     "testbed.runs.attributes",
     "testbed.runs.metrics",
     "testbed.runs.signals",
@@ -106,6 +108,8 @@ def test_every_public_function_can_be_called_with_every_package_imported(tmp_pat
     table = np.column_stack([t, rate, 0.9 * rate + 1e-3 * np.random.default_rng(1).standard_normal(t.size)])
     np.savetxt(tmp_path / "bench.csv", table, header="t [s],laser [deg/s],gyro [deg/s]", comments="", delimiter=",")
     called["identify_sensors"] = testbed.identify_sensors(testbed.read_log(tmp_path / "bench.csv"), "laser", "gyro")
+    called["export"] = testbed.export(tmp_path / "run", "csv", tmp_path / "exported")
+    called["replay"] = testbed.replay(called["export"] / "log.yaml", "kalman", out=tmp_path / "replayed")
     called["line_of_sight"] = testbed.line_of_sight(tmp_path / "run", {"tracker": {"bandwidth": "10 Hz"}})
     (tmp_path / "study.yaml").write_text(f"name: study\nbase: {path.name}\n")
     called["sweep"] = testbed.sweep(tmp_path / "study.yaml", out=tmp_path / "sweep")

@@ -226,6 +226,8 @@ def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
     def report(seeds, out):
         (out / "scale_factor.csv").write_text("frequency_hz,fused\n0.5,1.01\n1,\n")
         (out / "linearity.csv").write_text("frequency_hz,name\n2,nan\n3,gyro\n")
+        (out / "linearity_bent.csv").write_text("rate_deg_s\n1\n")
+        (out / "rivals.csv").write_text("filter\nkalman\n")
         yield f"{seeds} seed"
 
     monkeypatch.chdir(tmp_path)
@@ -238,6 +240,8 @@ def test_reproduce_says_the_rows_of_its_tables(tmp_path, monkeypatch, spoken):
         "tables": {
             "scale_factor": [{"frequency_hz": 0.5, "fused": 1.01}, {"frequency_hz": 1.0, "fused": None}],
             "linearity": [{"frequency_hz": 2.0, "name": None}, {"frequency_hz": 3.0, "name": "gyro"}],
+            "linearity_bent": [{"rate_deg_s": 1.0}],
+            "rivals": [{"filter": "kalman"}],
         },
         "written": "runs/paper2",
     }
