@@ -162,9 +162,14 @@ def _even_rate(stamps: NDArray[np.int64], index: NDArray[np.int64], quantum_ns: 
     """Return the rate that explains stamps, None if there is none, and what they are rounded to [ns].
 
     Steps of an exact clock, too, are multiples of a power of ten: what they seem rounded to counts only if it has to.
+    Nanoseconds of the epoch that went through a double are multiples of 256.
     """
-    exact = exact_rate(stamps, index, 0.0)
-    return (exact, 1.0) if exact is not None else (exact_rate(stamps, index, quantum_ns), quantum_ns)
+    divisor = int(np.gcd.reduce(np.diff(stamps)))
+    for rounded in (0.0, quantum_ns, float(divisor & -divisor)):
+        exact = exact_rate(stamps, index, rounded)
+        if exact is not None:
+            return exact, max(rounded, 1.0)
+    return None, quantum_ns
 
 
 def _sorted(stamps: NDArray[np.int64], values: FloatArray) -> tuple[NDArray[np.int64], FloatArray, int]:

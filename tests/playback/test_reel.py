@@ -81,3 +81,13 @@ def test_another_clock_that_is_even_stays_even(tmp_path):
     assert slower.start_ns == 7_000_000
     assert slower.sample_rate_hz == pytest.approx(1e6 / 501.0, rel=2e-8)  # to 2 ns of 100 ms
     assert reel.put_right(2.0 * reel.rate, reel.stamps()).sample_rate_hz == 2000.0
+
+
+def test_nanoseconds_of_the_epoch_that_went_through_a_double_are_even(tmp_path):
+    """At 1.7e18 a double counts in 256: no step of 50 000 ns is one of these stamps' own."""
+    stamps = np.array([float(1_700_000_005_500_000_000 + 50_000 * k) for k in range(4000)]).astype(np.int64)
+    assert np.unique(np.diff(stamps)).size > 1
+    path = tmp_path / "log.csv"
+    path.write_text("t [ns],w [deg/s]\n" + "".join(f"{t},{k % 7}\n" for k, t in enumerate(stamps.tolist())))
+    reel = wind(read_log(path).channels["w"])
+    assert (reel.sample_rate_hz, reel.stamps_ns, reel.quantum_ns) == (20_000.0, None, 256.0)
