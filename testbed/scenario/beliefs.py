@@ -180,7 +180,10 @@ def _search(sensor: Sensor) -> SensorBelief | None:
     for real, pairs in _FORMS:
         fit = identify(freq, response, real_poles=real, pole_pairs=pairs, blind_at_dc=blind)
         if fit.worst < _FIT_MISFIT:
-            found = fit.belief(input_noise=inner, output_noise=max(outer, _LEAST_OUTPUT * inner))
+            try:
+                found = fit.belief(input_noise=inner, output_noise=max(outer, _LEAST_OUTPUT * inner))
+            except ValueError:  # a band so slow that it reads nothing
+                return None
             return found.model_copy(update={"source": EXACT, **_slow_and_ends(sensor)})
     return None
 

@@ -64,7 +64,8 @@ def test_a_slow_band_is_refused_or_runs_to_its_figures(rate, bandwidth, belief):
         return
     begin = time.process_time()
     found = testbed.run(scenario).metrics.fusion["kalman"]
-    assert time.process_time() - begin < 10.0
+    # What hung took minutes; a filter of a new size compiles for up to 25 s.
+    assert time.process_time() - begin < 40.0
     assert np.isfinite(found.rmse_deg_s)
     if rate == "1 Hz":
         assert found.optimum_settled_deg_s is None

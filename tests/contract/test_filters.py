@@ -183,6 +183,7 @@ def test_the_order_of_the_sensors_does_not_matter(name: str, readings: dict[str,
 
 def test_diagnostics_have_units(name: str, readings: dict[str, FloatArray]) -> None:
     units = {"innovation": "rad/s", "variance": "rad^2/s^2", "R": "rad^2/s^2", "N": "rad^2/s^2", "Q": "rad^2/s^2"}
+    units |= {"delay": "s"}
     for key in built(name).process(readings).diagnostics:
         stem = "variance" if key.startswith("innovation_variance") else key.split("_")[0]
         assert diagnostic_unit(key) == units.get(stem, "1")

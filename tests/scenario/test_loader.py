@@ -178,7 +178,6 @@ def test_load_of_the_resolved_scenario_gives_the_same_run(tmp_path):
             "sensors.mems_gyro.angle_random_walk",
             "expected at least 0",
         ),
-        ("noise: off", "sample_rate: 3 kHz", 11, "sensors.mems_gyro.sample_rate", "divided by a whole number"),
         ("  kalman: {q:", "  kallman: {q:", 13, "fusion.kallman.type", "did you mean 'kalman'"),
         ("{q: 0.1 (deg/s)^2/s}", "{q: 0.1 deg/s}", 13, "fusion.kalman.q", "wrong dimension"),
         ("{q: 0.1 (deg/s)^2/s}", "{belief: eq93}", 13, "fusion.kalman.belief", "eq39"),

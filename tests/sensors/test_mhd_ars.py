@@ -165,7 +165,7 @@ def test_input_noise_is_the_output_noise_over_the_response() -> None:
 
 
 def test_every_parameter_is_among_the_options() -> None:
-    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting", "faults"}
+    assert set(MhdArs.model_fields) == {*OPTIONS, "channel", "mounting", "faults", "clock", "lost"}
 
 
 @pytest.mark.parametrize("key", OPTIONS)

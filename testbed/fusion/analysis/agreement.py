@@ -31,6 +31,8 @@ _TIE = 0.03
 _LOWEST_HZ, _HIGHEST_SHARE = 0.3, 0.4
 _STEPS, _WEIGHINGS = 8, 3
 # Enough of a band for the median of its residual to tell the scale of the noise.
+# Share of the motion below which an octave holds what the ends of the record leave of the others: 1 % of their size.
+_LEAST_SHARE = 1e-4
 _LEAST_LINES = 8
 # Of the clean path's power at most this share may be noise, and the gain must stand out this far [std], for a motion to
 # be common: the search alone finds 5.
@@ -192,10 +194,13 @@ class Pair:
         return scale
 
     def _departure(self, residual: ComplexArray, fitted: ComplexArray, weight: FloatArray) -> tuple[float, float]:
-        """Return the largest significant departure of an octave and its frequency [Hz]."""
+        """Return the largest significant departure of an octave that holds motion, and its frequency [Hz]."""
         worst, at = 0.0, math.nan
+        power = np.abs(fitted) ** 2
         for octave in np.unique(self._octave):
             mine = self._octave == octave
+            if power[mine].sum() < _LEAST_SHARE * power.sum():
+                continue
             information = float(np.sum(weight[mine] * np.abs(fitted[mine]) ** 2))
             found = abs(np.sum(weight[mine] * fitted[mine].conj() * residual[mine])) / information
             # The square of a complex normal is exponential: ln 1e4.

@@ -132,7 +132,8 @@ class SelfCalibrating(BlockFilter):
     Parameters: ClassVar[type[Part]] = SelfCalibratingParameters
     needs_both = True
     caution = "what both sensors share, a gain or a delay, cannot be seen"
-    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
+    # Inside a constant rate the first seconds are part of what gain and delay are learned from.
+    start_leaves = (0.0045 * DEG, 0.05 * DEG)
 
     def __init__(
         self,
