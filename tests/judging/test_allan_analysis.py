@@ -147,7 +147,8 @@ def test_a_sensor_with_gaps_is_analysed_beside_the_others(still_run, monkeypatch
 
     sensors = {name: with_gaps(signals.rate) for name, signals in run.sensors.items()}
     monkeypatch.setattr(
-        "testbed.runs.results.RunRecord.open", lambda _: SimpleNamespace(sensors=sensors, truth=run.truth, metrics=run.metrics)
+        "testbed.runs.results.RunRecord.open",
+        lambda _: SimpleNamespace(sensors=sensors, truth=run.truth, metrics=run.metrics),
     )
     for record in read_run(still_run):
         assert np.isnan(record.rate).any()
