@@ -197,6 +197,9 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
             f"expected at least {FEWEST} means of {one.average} samples, got {numbers.size}: take fewer for a mean"
         )
         raise refusal(table.path, message, "--average")
+    if one.average > 1 and np.isnan(numbers).all():
+        message = f"{one.label} has a value in too few rows for means of {one.average} samples: --average 1 keeps all"
+        raise refusal(table.path, message, "--average")
     if clock is not None and one.average > 1:
         refuse_uneven(table, clock)
         notes.append(f"means of {one.average} samples of {clock.rate_hz:.6g} Hz")

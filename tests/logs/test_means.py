@@ -105,6 +105,17 @@ def test_a_recording_that_memory_should_not_hold_is_averaged_and_says_so(tmp_pat
     assert read_log(path).channels["w"].values.size == whole.rate.size, "the library averages nothing by itself"
 
 
+def test_a_slow_sensor_in_the_rows_of_a_quick_one_has_no_means_and_says_so(tmp_path, monkeypatch):
+    sparse = [one if k % 10 == 0 else "" for k, one in enumerate(DEG)]
+    path = log(tmp_path, SECONDS, sparse)
+    assert read(path, Selection())[0].rate.size == 400
+    monkeypatch.setattr(keeping, "MOST_WHOLE", 3000)
+    monkeypatch.setattr(keeping, "_MEANS", 300)
+    with pytest.raises(ScenarioError, match="too few rows for means of 16 samples: --average 1 keeps all"):
+        read(path, Selection())
+    assert read(path, Selection(average=1))[0].rate.size == 400
+
+
 @pytest.mark.parametrize("head", ["t,w [deg/s]\n", "t,w [deg/s]\r\n"])
 def test_the_number_of_rows_of_a_text_is_told_from_its_beginning(tmp_path, head):
     path = tmp_path / "log.csv"
