@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from testbed.errors import Problem, ScenarioError
-from testbed.units import RateUnit  # noqa: TC001 - of a field
+from testbed.units import RateUnit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

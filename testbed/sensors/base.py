@@ -326,8 +326,8 @@ class Sensor(Part):
 
     @property
     def reading_std(self) -> float:
-        """Standard deviation of the noise of a reading [rad/s], as if it were white with its density at a quarter of the
-        sample rate; the same with `noise` off.
+        """Standard deviation of the noise of a reading [rad/s], as if it were white with its density at a quarter of
+        the sample rate; the same with `noise` off.
         """
         quarter = np.array([0.25 * self.sample_rate])
         with np.errstate(all="ignore"):
