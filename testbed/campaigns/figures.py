@@ -87,11 +87,11 @@ def _curves(found: Summary, key: str) -> Figure:
         if kind == "filter":
             for bound in ("floor", "optimum"):
                 bounds.setdefault(bound, [_rms([getattr(point, bound) for point in group]) for _, group in along])
-    for (bound, values), style in zip(bounds.items(), (_DOTTED, (0, (4, 2))), strict=False):
+    for (bound, values), dash in zip(bounds.items(), (_DOTTED, (0, (4, 2))), strict=False):
         if np.isfinite(values).any():
-            axes.plot(x, values, color=INK, linewidth=1.4, linestyle=style)
+            axes.plot(x, values, color=INK, linewidth=1.4, linestyle=dash)
             words = {"floor": "noise floor", "optimum": "optimum of each case"}[bound]
-            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=style, label=words))
+            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dash, label=words))
     _scale(axes, key, x)
     axes.set_yscale("log")
     axes.set_ylabel("RMSE [deg/s]")
