@@ -12,7 +12,8 @@ import pytest
 from testbed.fusion import estimate
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters import kalman, shakf, steady_state, wideband
-from testbed.fusion.kernels.covariance import HEADER_ROWS, kalman_kernel, predict, update
+from testbed.fusion.kernels.bank import predict_half, update_half, weigh
+from testbed.fusion.kernels.covariance import HEADER_ROWS, innovation, kalman_kernel, predict, update
 from testbed.fusion.model import build_model
 from testbed.fusion.transitions import even
 
@@ -125,6 +126,16 @@ def test_nothing_is_predicted_before_the_first_reading() -> None:
     )
     assert np.array_equal(P, model.P0)
     assert np.array_equal(out[1], np.full(50, np.sqrt(model.P0[0, 0])))
+
+
+def test_what_the_kernels_call_is_compiled_once_for_all_sizes() -> None:
+    """A size that reaches it as a literal makes a version of its own: seconds more for every model that is new."""
+    readings = {"mems_gyro": np.zeros(2), "mhd_ars": np.zeros(20)}
+    for kernel in ("kalman", "steady_state", "arw_shakf", "wideband"):
+        estimate(kernel, readings, sample_rate_hz={"mems_gyro": 2e3, "mhd_ars": 2e4})
+    for called in (predict, update, innovation, predict_half, update_half, weigh):
+        assert called.signatures
+        assert not [signature for signature in called.signatures if "Literal" in str(signature)]
 
 
 _SECOND_START = """
