@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from numba import njit
 
 from testbed.fusion import estimate
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters import kalman, shakf, steady_state, wideband
-from testbed.fusion.kernels.bank import predict_half, update_half, weigh
 from testbed.fusion.kernels.covariance import HEADER_ROWS, innovation, kalman_kernel, predict, update
 from testbed.fusion.model import build_model
 from testbed.fusion.transitions import even
@@ -128,12 +128,16 @@ def test_nothing_is_predicted_before_the_first_reading() -> None:
     assert np.array_equal(out[1], np.full(50, np.sqrt(model.P0[0, 0])))
 
 
-def test_what_the_kernels_call_is_compiled_once_for_all_sizes() -> None:
+@pytest.mark.slow
+def test_what_a_kernel_calls_is_compiled_once_for_all_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
     """A size that reaches it as a literal makes a version of its own: seconds more for every model that is new."""
-    readings = {"mems_gyro": np.zeros(2), "mhd_ars": np.zeros(20)}
-    for kernel in ("kalman", "steady_state", "arw_shakf", "wideband"):
-        estimate(kernel, readings, sample_rate_hz={"mems_gyro": 2e3, "mhd_ars": 2e4})
-    for called in (predict, update, innovation, predict_half, update_half, weigh):
+
+    def afresh(*sizes: Any) -> Any:
+        return njit(error_model="numpy")(kalman_kernel(*sizes).py_func)
+
+    monkeypatch.setattr(kalman, "kalman_kernel", afresh)
+    estimate("kalman", {"mems_gyro": np.zeros(2)}, sample_rate_hz={"mems_gyro": 2000.0})
+    for called in (predict, update, innovation):
         assert called.signatures
         assert not [signature for signature in called.signatures if "Literal" in str(signature)]
 
