@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import re
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -62,14 +63,16 @@ def leaderboard() -> str:
     parts = [
         "# Leaderboard: the table\n",
         "What the columns mean, how a filter enters and how the table is cited: [leaderboard](../../leaderboard.md).\n",
-        "| filter | error over optimum | 95 % | worst | where | claims hold | error over claim | time over kalman's |",
-        "|---|---|---|---|---|---|---|---|",
+        "| filter | error over optimum | 95 % | worst | where | claims hold | error over claim | time over kalman's "
+        "| line of sight [urad] |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for one in order:
         claims = f"{100 * one.honest:.0f} % | {one.error_over_claim:.3g}"
         cost = "" if one.cost is None else f"{one.cost:.2g}"
         error = f"{one.over_optimum:.3g} | {one.lower:.3g} to {one.upper:.3g} | {one.worst:.3g} | {one.worst_case}"
-        parts.append(f"| `{one.name}` | {error} | {claims} | {cost} |")
+        sight = "" if math.isnan(one.residual) else f"{one.residual:.3g}"
+        parts.append(f"| `{one.name}` | {error} | {claims} | {cost} | {sight} |")
     cases, seeds = {tuple(row[axis] for axis in AXES) for row in rows}, {row["seed"] for row in rows}
     parts += ["", f"{len(cases)} cases, {len(seeds)} seeds each.\n", "## Entries\n"]
     parts += [
