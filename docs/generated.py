@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _LONGEST = 60
+_STANDINGS = (
+    *("filter", "error over optimum", "95 %", "worst", "where", "claims hold", "error over claim"),
+    *("time over kalman's", "line of sight [urad]"),
+)
 _OTHERS = re.compile(r"\n(?:Examples|Raises|References|Notes)\n---")
 # A bar outside of a formula, and the mark of a reference.
 _BAR, _CITED = re.compile(r"(?<![`\\])\|(?![^`\n]*`)"), re.compile(r"\s*\[\d+\]_")
@@ -63,9 +67,8 @@ def leaderboard() -> str:
     parts = [
         "# Leaderboard: the table\n",
         "What the columns mean, how a filter enters and how the table is cited: [leaderboard](../../leaderboard.md).\n",
-        "| filter | error over optimum | 95 % | worst | where | claims hold | error over claim | time over kalman's "
-        "| line of sight [urad] |",
-        "|---|---|---|---|---|---|---|---|---|",
+        f"| {' | '.join(_STANDINGS)} |",
+        f"|{'---|' * len(_STANDINGS)}",
     ]
     for one in order:
         claims = f"{100 * one.honest:.0f} % | {one.error_over_claim:.3g}"

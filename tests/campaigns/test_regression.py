@@ -13,11 +13,11 @@ import testbed
 from testbed.campaigns.agenda import play
 from testbed.campaigns.regression import standard
 from testbed.campaigns.regression.compare import LIMIT_DEG, in_words, incomparable, moves
-from testbed.campaigns.regression.folder import code_sha256
 from testbed.campaigns.regression.history import NUMBERS, append, latest, read_history
 from testbed.campaigns.regression.leaderboard import standings
 from testbed.campaigns.regression.regress import run_regression
 from testbed.campaigns.regression.standard import AXES, SHORT, STANDARD, Contenders, Setting, published, standard_study
+from testbed.campaigns.renewal import code_sha256
 from testbed.campaigns.statistics import holm
 from testbed.campaigns.study import load_study
 from testbed.campaigns.sweep import sweep

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.regression.compare import Move, incomparable, moves
-from testbed.campaigns.regression.folder import code_sha256, make_way
 from testbed.campaigns.regression.history import HISTORY, append, essence, latest, read_history
 from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
 from testbed.campaigns.regression.page import write_leaderboard
 from testbed.campaigns.regression.standard import SHORT, STANDARD, Contenders, shipped, standard_study
+from testbed.campaigns.renewal import code_sha256, make_way
 from testbed.campaigns.rows import OK
 from testbed.campaigns.store import read_cases
 from testbed.campaigns.sweep import sweep
@@ -109,4 +109,3 @@ def _spent() -> float:
     """Return the processor time of this process and of those that it started and that ended [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
-

@@ -1,4 +1,4 @@
-"""The folder of a standard campaign: gone on with by the code that began it, played anew by any other."""
+"""Folders that a command names itself: gone on with by the code that began them, played anew by any other."""
 
 from __future__ import annotations
 
