@@ -125,6 +125,7 @@ class Judge:
             "seed": frame.seed,
             "duration_s": frame.duration,
             "settle_s": frame.settle,
+            "rate_unit": self._scenario.rate_unit,
             "bandwidth_hz": frame.bandwidth,
             "turntable": self._case.table,
             "sensors": sensors,

@@ -461,6 +461,7 @@ def test_report_memory_is_flat_in_duration(tmp_path: Path):
 def test_a_slow_run_is_in_one_unit_and_of_one_sensor_in_its_words(tmp_path: Path):
     """Every rate in deg/h, figure numbers in their order, no word of a second sensor or of a filter."""
     metrics = metrics_of(3.0, 1.0, ())
+    metrics["rate_unit"] = "deg/h"
     metrics["sensors"] = {"mems_gyro": {"rmse_deg_s": 1e-4, "peak_error_deg_s": 3e-16, "lines": []}}
     page = write_report(make_run(tmp_path / "run", metrics)).read_text(encoding="utf-8")
     text = re.sub(r"<svg.*?</svg>|<pre.*?</pre>", "", page, flags=re.DOTALL)
