@@ -1,4 +1,4 @@
-"""What there is to choose from: motions, sensors, presets, filters, beliefs, bands, drift models and methods, papers."""
+"""What there is to choose from: motions, sensors, presets, filters, beliefs, bands, drift models, papers."""
 
 from __future__ import annotations
 

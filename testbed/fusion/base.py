@@ -67,8 +67,8 @@ class EstimateBlock:
         are those of (11), before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
         R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
         of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
-        guard_hits counts how often a bound held R or Q so far; frequency_<sensor> is what `FrequencyRows` reads off that
-        sensor [Hz]. Of readings with stamps, what belongs to one of another sensor stands at the next stamp of the
+        guard_hits counts how often a bound held R or Q so far; frequency_<sensor> [Hz] is what `FrequencyRows` reads
+        off that sensor. Of readings with stamps, what belongs to one of another sensor stands at the next stamp of the
         fastest one, and late_<sensor> counts those that came too late so far.
     time_ns : ndarray of int, shape (n_time,), optional
         Stamps of the fastest sensor [ns], of readings that have some; those that came too late are left out.

@@ -205,8 +205,7 @@ class FrequencyRows:
         self._sample = 0
 
     def process(self, readings: Mapping[str, FloatArray], n_time: int) -> dict[str, FloatArray]:
-        """Return ``frequency_<sensor>`` over the next block [Hz]: NaN between readings, and where no signal stands above
-        the noise.
+        """Return ``frequency_<sensor>`` over the next block [Hz]: NaN between readings and without a signal above noise.
 
         Parameters
         ----------
