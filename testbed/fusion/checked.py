@@ -72,11 +72,11 @@ class CheckedFilter:
             self.check_clocks()
             views.append({name: _read_only(values) for name, values in time_ns.items()})
         estimate = self._inner.process(*views) if self._shipped else self._foreign(views)
+        rows: dict[str, FloatArray] = {}
         if not (time_ns is None and self._even()):
             n_time = -1 if estimate.time_ns is None else estimate.time_ns.size
-            rows = None
-        else:
-            rows = self._frequency and self._frequency.process(views[0], n_time)
+        elif self._frequency is not None:
+            rows = self._frequency.process(views[0], n_time)
         self._check_shapes(estimate, n_time)
         checked = estimate if self._shipped else self._checked(estimate)
         self._sample += n_time
@@ -105,7 +105,7 @@ class CheckedFilter:
             return self.process(readings, time_ns)
         timed = not (time_ns is None and self._even())
         n_time = max(values.size for values in readings.values())
-        rows = None if timed else self._frequency and self._frequency.blank(n_time)
+        rows = {} if timed or self._frequency is None else self._frequency.blank(n_time)
         return _beside(self._inner.blank(n_time, timed=timed), rows)
 
     def _even(self) -> bool:
@@ -173,7 +173,7 @@ class CheckedFilter:
         raise RunError(msg) from cause
 
 
-def _beside(estimate: EstimateBlock, rows: dict[str, FloatArray] | None) -> EstimateBlock:
+def _beside(estimate: EstimateBlock, rows: dict[str, FloatArray]) -> EstimateBlock:
     return replace(estimate, diagnostics=estimate.diagnostics | rows) if rows else estimate
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import lfilter
 
+from testbed.signals import BLOCK
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -205,7 +207,7 @@ class FrequencyRows:
         self._sample = 0
 
     def process(self, readings: Mapping[str, FloatArray], n_time: int) -> dict[str, FloatArray]:
-        """Return ``frequency_<sensor>`` over the next block [Hz]: NaN between readings and without a signal above noise.
+        """Return ``frequency_<sensor>`` over the next block [Hz], NaN between readings and without a signal.
 
         Parameters
         ----------
@@ -215,9 +217,11 @@ class FrequencyRows:
             Its length, at the fastest rate.
         """
         rows = self.blank(n_time)
-        for name, (energies_of, stride) in self._sensors.items():
-            _, frequency = energies_of.choose(*energies_of.process(readings[name]))
-            rows[f"{FREQUENCY}{name}"][-self._sample % stride :: stride] = frequency
+        for name, (means, stride) in self._sensors.items():
+            row = rows[f"{FREQUENCY}{name}"][-self._sample % stride :: stride]
+            for first in range(0, row.size, BLOCK):
+                part = slice(first, first + BLOCK)
+                _, row[part] = means.choose(*means.process(readings[name][part]))
         self._sample += n_time
         return rows
 
