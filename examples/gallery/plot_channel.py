@@ -4,7 +4,8 @@ How deep does the wall drag the fluid?
 
 The velocity u of the mercury relative to the wall, whose own is v, from equation (2) of Su et al. 2024
 
-.. math:: \partial_t u = \nu \, \partial_h^2 u - \frac{\sigma B^2}{\rho} u - \partial_t v , \qquad u = 0 \text{ at the walls.}
+.. math:: \partial_t u = \nu \, \partial_h^2 u - \frac{\sigma B^2}{\rho} u - \partial_t v ,
+    \qquad u = 0 \text{ at the walls.}
 
 At low frequencies the fluid turns with the wall and the sensor is blind.
 At high ones only a Stokes layer of depth :math:`\sqrt{2 \nu / \omega}` follows, and the core stands still.
