@@ -18,7 +18,7 @@ import math
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import pint
 from pydantic_core import PydanticCustomError, core_schema
@@ -26,11 +26,18 @@ from pydantic_core import PydanticCustomError, core_schema
 from testbed.errors import quoted
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
 DEG = math.radians(1.0)  # rad
 DEG_H = DEG / 3600.0  # rad/s
 CELSIUS = 273.15  # K, 0 degC
+# Units in which the rates of a run are shown, and what rad/s is multiplied by for them.
+RateUnit = Literal["deg/s", "deg/h"]
+PER_RATE: dict[RateUnit, float] = {"deg/s": 1.0 / DEG, "deg/h": 1.0 / DEG_H}
+# A tenth of the Earth's rate.
+_SLOW = 1.5 * DEG_H
 
 _DEFINITIONS = """
 nano- = 1e-9 = n-
@@ -200,6 +207,24 @@ def parse(text: str, si: str, *, example: str = "", cycle_is_number: bool = Fals
         msg = f"{expected}, got {quoted(text)}, which is not finite"
         raise ValueError(msg)
     return value
+
+
+def rate_unit(noise: Iterable[float]) -> RateUnit:
+    """Return the unit in which all rates of a run are shown, known before it starts: deg/h where no reading is noisier
+    than a tenth of the Earth's rate, else deg/s.
+
+    Parameters
+    ----------
+    noise : iterable of float
+        Standard deviation of the noise of a reading, of each sensor [rad/s]; zero and NaN say nothing.
+
+    Examples
+    --------
+    >>> rate_unit([0.05 * DEG_H]), rate_unit([0.05 * DEG_H, 0.1 * DEG]), rate_unit([0.0])
+    ('deg/h', 'deg/s', 'deg/s')
+    """
+    known = [std for std in noise if std > 0.0]
+    return "deg/h" if known and max(known) < _SLOW else "deg/s"
 
 
 def _plain(unit: str) -> str:

@@ -33,7 +33,7 @@ ROOMS = {
     "pointing": {"metrics", "fusion"},
     "runs": {"models", "fusion", "pointing"},
     "scenario": {"models", "sensors", "fusion", "pointing"},
-    "report": {"pages", "metrics", "runs"},
+    "report": {"pages", "metrics", "allan", "runs"},
     "recording": {"pages", "metrics", "runs"},
     "identification": {"fusion", "logs", "metrics", "pages"},
     "notebook": {"pages", "runs", "report"},

@@ -75,6 +75,7 @@ def open_sinks(
             settle=scenario.frame.settle,
             detail=scenario.detail,
             times_ns=chain.time_ns,
+            unit=scenario.rate_unit,
             live=live,
         )
         sinks.append(stack.enter_context(recording))

@@ -88,7 +88,7 @@ def print_page(scenario: Scenario, facts: TableFacts, size: Forecast) -> None:
         console.print(f"motion {i + 1}: {kind} {words}", soft_wrap=True)
     _print_departures(scenario)
     print_sheets(console, scenario)
-    print_facts(console, facts)
+    print_facts(console, facts, scenario.rate_unit)
     if scenario.pointing is not None:
         console.print(f"pointing: {aim_words(scenario)}", soft_wrap=True, highlight=False)
     for line in slow_noise_lines(scenario):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from testbed.cli.console import ruled, terminal
 from testbed.cli.terminal import step_words
-from testbed.runs.table import rate_text
+from testbed.runs.table import rate_text, shown_in
 from testbed.scenario.peaks import command_peaks
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from testbed.judging.table_facts import TableFacts
     from testbed.scenario.model import Scenario
     from testbed.sensors.data_sheet import Step
+    from testbed.units import RateUnit
 
 
 def understood(scenario: Scenario) -> dict[str, dict[str, str]]:
@@ -74,7 +75,7 @@ def print_scenario(scenario: Scenario, facts: TableFacts) -> None:
         keys.add_row(key, value["written"], value["si"])
     console.print(keys)
     print_sheets(console, scenario)
-    print_facts(console, facts)
+    print_facts(console, facts, scenario.rate_unit)
     console.print("The scenario is valid.")
 
 
@@ -101,7 +102,7 @@ def print_sheets(console: Console, scenario: Scenario) -> None:
             console.print(sheet)
 
 
-def print_facts(console: Console, facts: TableFacts) -> None:
+def print_facts(console: Console, facts: TableFacts, unit: RateUnit) -> None:
     """Print what is known of the turntable before the run.
 
     Parameters
@@ -110,13 +111,15 @@ def print_facts(console: Console, facts: TableFacts) -> None:
         Where to.
     facts : TableFacts
         What is known.
+    unit : str
+        In which rates are shown.
     """
     modes = [f"{f:.4g} Hz ({z:.2g})" for f, z in zip(facts.freq_hz, facts.damping, strict=True)]
     torque = f"required torque {facts.required_torque:.4g} N m"
     if facts.torque_limit is not None:
         used = facts.required_torque / facts.torque_limit
         torque += f" of {facts.torque_limit:.4g} N m, margin {100 * (1 - used):.0f} %"
-    noise = f"arithmetic noise of the truth {rate_text(math.degrees(facts.truth_noise), ('deg/s', 1.0))} rms"
+    noise = f"arithmetic noise of the truth {rate_text(math.degrees(facts.truth_noise), shown_in(unit))} rms"
     step = step_words(facts.step.engine, facts.step.step, facts.step.holds / facts.step.substeps, facts.step.error)
     for line in (f"coupled modes (damping): {', '.join(modes)}" if modes else "", torque, noise, step):
         if line:

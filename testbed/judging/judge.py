@@ -8,6 +8,7 @@ import numpy as np
 
 from testbed.fusion.belief import declared
 from testbed.judging.case import CaseFacts
+from testbed.judging.profiles import ProfileKeeper
 from testbed.judging.sights import pointing_judges, pointing_value
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
@@ -59,6 +60,7 @@ class Judge:
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
         self._sights = pointing_judges(scenario, rates["base"])
+        self._profiles = ProfileKeeper(scenario)
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
@@ -75,6 +77,7 @@ class Judge:
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
         for name, sight in block.pointing.items():
             self._sights[name].process(sight, block.truth.rate)
+        self._profiles.write(block)
 
     def _add(self, name: str, rate: FloatArray, std: FloatArray | None) -> tuple[FloatArray, int]:
         """Add a block of readings or estimates; return the error after `settle`, and at which sample of the block that
@@ -120,11 +123,13 @@ class Judge:
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
         sights = {name: sight.result() for name, sight in self._sights.items()}
+        profiles = self._profiles.result()
         found = {
             "scenario": self._scenario.name,
             "seed": frame.seed,
             "duration_s": frame.duration,
             "settle_s": frame.settle,
+            "rate_unit": self._scenario.rate_unit,
             "bandwidth_hz": frame.bandwidth,
             "turntable": self._case.table,
             "sensors": sensors,
@@ -132,6 +137,7 @@ class Judge:
             "bounds_reason": self._case.reason(why),
             **self._case.pages,
             **({"pointing": sights} if sights else {}),
+            **({"profiles": profiles} if profiles else {}),
             "expectations": self._expectations({**sensors, **fusion}, sights),
             "versions": dict(versions or {}),
         }

@@ -13,6 +13,7 @@ from scipy.interpolate import make_interp_spline
 from testbed.errors import Problem, ScenarioError
 from testbed.logs.clock import NANO
 from testbed.runs.block import first_due
+from testbed.units import rate_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from testbed.playback.reel import Reel
     from testbed.signals import FloatArray
+    from testbed.units import RateUnit
 
 FEWEST = 4
 # As the filters take rates for whole multiples.
@@ -28,6 +30,8 @@ _SAME = 1e-9
 # Instants that are one [ns].
 _SAME_NS = 0.5
 _BEFORE = 1.5
+# Median of |a - b| over the standard deviation of a and b, both Gaussian.
+_MEDIAN_STEP = 0.6744897501960817 * math.sqrt(2.0)
 # Beyond this many steps of the reference from its nearest known samples there is no reference.
 _REACH = 1.5
 
@@ -78,6 +82,11 @@ class Lineup:
         if self.stamps_ns is not None:
             return NANO * float(self.stamps_ns["base"][-1]) + 1.0 / self.rates["base"]
         return self.n_time / self.rates["base"]
+
+    @property
+    def rate_unit(self) -> RateUnit:
+        """Unit in which every rate of a replay is shown, by what neighbouring readings differ."""
+        return rate_unit(_noise(values) for values in self.readings.values())
 
     def times(self) -> dict[str, FloatArray]:
         """Return the stamps of ``base`` and of every sensor, shape (n_time,) [s]."""
@@ -177,6 +186,12 @@ def _by_stamps(reels: Sequence[Reel], fastest: Reel, reference: Reel | None) -> 
         references["base"] = references[fastest.name]
     rates = {"base": fastest.sample_rate_hz, **{reel.name: reel.sample_rate_hz for reel in reels}}
     return Lineup(rates, readings, references or None, start, dropped, stamps_ns)
+
+
+def _noise(readings: FloatArray) -> float:
+    """Return the standard deviation of white noise whose steps would be as large as those of the readings [rad/s]."""
+    steps = np.abs(np.diff(readings[np.isfinite(readings)]))
+    return float(np.median(steps)) / _MEDIAN_STEP if steps.size else 0.0
 
 
 def _stride(reel: Reel, fastest: Reel) -> int | None:

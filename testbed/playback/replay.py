@@ -286,6 +286,7 @@ def _played(made: Playback, sinks: Sequence[Sink | MemoryStore], block: int, tic
             "seed": None,
             "duration_s": lineup.duration,
             "settle_s": made.settle,
+            "rate_unit": lineup.rate_unit,
             **judge.result(),
             "replay": made.facts,
             "findings": [finding_entry(one) for one in made.verdict.findings],

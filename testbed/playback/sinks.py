@@ -73,6 +73,7 @@ def replay_sinks(
             settle=settle,
             detail=(settle, min(settle + max(_DETAIL, _FEWEST / rates["base"]), lineup.duration)),
             times_ns=lineup.stamps_ns,
+            unit=lineup.rate_unit,
         )
         sinks.append(stack.enter_context(recording))
     return sinks

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
     from testbed.recording.stream import Recording
     from testbed.signals import FloatArray
+    from testbed.units import RateUnit
 
 # Drawing units: Rerun's 2-D view has equal axes, y pointing down, so the plot is a box into which the curve is scaled.
 WIDTH, HEIGHT = 160.0, 90.0
-# What a table at rest leaves is arithmetic and no profile; its scale would not fit a single-precision number [rad/s].
+# What a table at rest leaves is arithmetic and no profile; its scale would not fit a single-precision number.
 SMALLEST = 1e-14
 FRACTIONS = (1 / 32, 1 / 8, 1 / 2)  # of the channel height; the flow is symmetric for a rotating wall
 
@@ -27,8 +28,8 @@ FRACTIONS = (1 / 32, 1 / 8, 1 / 2)  # of the channel height; the flow is symmetr
 class Channel:
     """Draws the profile of one sensor under `/sensors/<name>/channel`.
 
-    `profile` is a line of points (u [rad/s], h [m]), exact but for float32, put into the plot by one static transform;
-    `velocity` has the same u as scalars [rad/s] at a few heights.
+    `profile` is a line of points (u, h [m]), exact but for float32, put into the plot by one static transform;
+    `velocity` has the same u as scalars at a few heights.
 
     Parameters
     ----------
@@ -40,16 +41,18 @@ class Channel:
         Heights of the nodes above the lower wall [m].
     color : str
         Of the sensor.
+    unit : str
+        Of u.
     """
 
-    def __init__(self, recording: Recording, sensor: str, heights: FloatArray, color: str) -> None:
+    def __init__(self, recording: Recording, sensor: str, heights: FloatArray, color: str, unit: RateUnit) -> None:
         self.entity = f"/sensors/{sensor}/channel"
-        self._recording, self._heights, self._color = recording, heights, color
+        self._recording, self._heights, self._color, self._unit = recording, heights, color, unit
         self._largest = 0.0
         self._batch = recording.batch(self._send, FRAMES)
         wanted = np.array(FRACTIONS) * heights.max()
         self.probes = np.abs(heights[:, np.newaxis] - wanted).argmin(axis=0)
-        names = [f"u(h = {heights[node] * 1e3:.2f} mm) [rad/s]" for node in self.probes]
+        names = [f"u(h = {heights[node] * 1e3:.2f} mm) [{unit}]" for node in self.probes]
         shades = [mix(color, "#e2553d", share) for share in np.linspace(0, 1, len(names))]
         recording.lines(f"{self.entity}/velocity", names, shades)
 
@@ -61,7 +64,7 @@ class Channel:
         index : ndarray of int, shape (n_pose,)
             Base samples.
         profiles : ndarray, shape (n_pose, n_height)
-            Velocity of the fluid relative to the wall, per radius [rad/s].
+            Velocity of the fluid relative to the wall, per radius [the unit].
         """
         self._largest = max(self._largest, float(np.abs(profiles).max(initial=0.0)))
         self._batch.add(index, profiles)
@@ -86,11 +89,10 @@ class Channel:
         frame = [[[-right, 0], [right, 0]], [[-right, up], [right, up]], [[0, 0], [0, up]], [[-right, 0], [-right, up]]]
         walls = rr.LineStrips2D(frame, colors=rgb(INK), radii=[rr.Radius.ui_points(r) for r in (2.0, 2.0, 0.5, 0.5)])
         self._recording.static(f"{self.entity}/axes", walls)
-        unit, scale = ("rad/s", 1.0) if full >= 1.0 else ("mrad/s", 1e3) if full >= 1e-3 else ("µrad/s", 1e6)
-        texts = [(x * right, 7.0, f"{x * full * scale:g}") for x in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+        texts = [(x * right, 7.0, f"{x * full:g}") for x in (-1.0, -0.5, 0.0, 0.5, 1.0)]
         texts += [(-right - 9.0, y * up, f"{y * top * 1e3:g}") for y in (0.0, 0.5, 1.0)]
         texts += [
-            (0.0, 17.0, f"fluid minus wall, per radius [{unit}]"),
+            (0.0, 17.0, f"fluid minus wall, per radius [{self._unit}]"),
             (-right + 12.0, up - 10.0, "height above lower wall [mm]"),
         ]
         places = rr.Points2D(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from testbed.recording.stream import Clock
+    from testbed.units import RateUnit
 
 ZOOM = 0.05  # s on each side of the time cursor
 SHOWN = 0.5  # s of the window recorded sample by sample
@@ -28,20 +29,20 @@ LEGEND = 0.25  # room for the legend, as a share of the span
 LOG = "log10_"
 # Points of the screen: what plots share in a window of 900, what a plot needs beside its legend, and a name in that.
 ROOM, FRAME, ENTRY = 834, 88, 23
-DIAGNOSTICS = {  # prefix of the name: quantity and unit
+DIAGNOSTICS = {  # prefix of the name: quantity and unit, in which {} is that of a rate
     # The viewer has no logarithmic axis: what spans decades is recorded as its logarithm too.
-    f"{LOG}R_": ("Adapted R", "log10 of (rad/s)²"),
-    f"{LOG}N_": ("Noise statistic N", "log10 of (rad/s)²"),
-    f"{LOG}Q_": ("Process noise Q", "log10 of (rad/s)²"),
+    f"{LOG}R_": ("Adapted R", "log10 of ({})²"),
+    f"{LOG}N_": ("Noise statistic N", "log10 of ({})²"),
+    f"{LOG}Q_": ("Process noise Q", "log10 of ({})²"),
     "gated_": ("Gated readings", "counted"),
-    "R_": ("Adapted R", "(rad/s)²"),
-    "N_": ("Noise statistic N", "(rad/s)²"),
+    "R_": ("Adapted R", "({})²"),
+    "N_": ("Noise statistic N", "({})²"),
     "band_": ("Band: 0 low, 1 mid, 2 high", "-"),
-    "innovation_": ("Innovation", "rad/s"),
-    "innovation_variance_": ("Innovation variance", "(rad/s)²"),
+    "innovation_": ("Innovation", "{}"),
+    "innovation_variance_": ("Innovation variance", "({})²"),
     "S_": ("Factor S of R", "-"),
-    "Q_": ("Process noise Q", "(rad/s)²"),
-    "std": ("Claimed std", "rad/s"),
+    "Q_": ("Process noise Q", "({})²"),
+    "std": ("Claimed std", "{}"),
     "": ("Diagnostic", ""),
 }
 
@@ -58,6 +59,7 @@ def blueprint(
     channels: Sequence[str],
     model: mujoco.MjModel | None,
     clock: Clock,
+    unit: RateUnit,
     marks: Sequence[str] = (),
     live: bool = False,
 ) -> rrb.Blueprint:
@@ -73,6 +75,8 @@ def blueprint(
         The bodies, for the place of the camera; a recording that is replayed has none.
     clock : Clock
         Length of the run and the window recorded sample by sample.
+    unit : str
+        Of every rate.
     marks : sequence of str, optional
         Paths of the crosses of readings that were struck out.
     live : bool, optional
@@ -88,16 +92,16 @@ def blueprint(
     span = f"every sample from {zoom[0]:g} to {zoom[1]:g} s"
     left: list[rrb.View | rrb.Container] = [] if model is None else [_turntable(model)]
     if channels:
-        probes = [(f"At three heights, {n} [rad/s]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
+        probes = [(f"At three heights, {n} [{unit}]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
         left.append(_tabs([*map(_profile, channels), *(_plot(*probe, zoom) for probe in probes)]))
     right: list[Row] = [
-        ("Rates", [_plot("Rate, whole run [rad/s]", rates, (0.0, duration))], len(rates)),
+        ("Rates", [_plot(f"Rate, whole run [{unit}]", rates, (0.0, duration))], len(rates)),
         (
             "Rates, closer",
             [
-                _plot(f"Rate, {span} [rad/s]", [*rates, *marks], zoom),
-                _at_cursor(f"Rate ±{_short(around)} at the cursor [rad/s]", [*rates, *marks], around),
-                _plot(f"{estimated} [rad/s]", truth_and_filters, (0.0, duration)),
+                _plot(f"Rate, {span} [{unit}]", [*rates, *marks], zoom),
+                _at_cursor(f"Rate ±{_short(around)} at the cursor [{unit}]", [*rates, *marks], around),
+                _plot(f"{estimated} [{unit}]", truth_and_filters, (0.0, duration)),
             ],
             len(rates) + len(marks),
         ),
@@ -106,9 +110,9 @@ def blueprint(
     errors = [entity for entity in entities if entity.endswith("/error") and entity.startswith("/fusion/")]
     if errors:
         views = [
-            _plot(f"Error = estimate − truth, {span} [rad/s]", errors, zoom),
-            _plot(f"Error from {window[0]:g} s on [rad/s]", errors, (window[0], duration)),
-            _plot("Error, whole run [rad/s]", errors, (0.0, duration)),
+            _plot(f"Error = estimate − truth, {span} [{unit}]", errors, zoom),
+            _plot(f"Error from {window[0]:g} s on [{unit}]", errors, (window[0], duration)),
+            _plot(f"Error, whole run [{unit}]", errors, (0.0, duration)),
         ]
         right.append(("Errors", views, len(errors)))
     if sights := [entity for entity in entities if entity.startswith("/pointing/")]:
@@ -123,11 +127,11 @@ def blueprint(
         drifts = [entity for entity in entities if entity.endswith("/drift")]
         views = [
             _plot("Temperature inside [K]", thermometers, (0.0, duration)),
-            _plot("True thermal drift [rad/s]", drifts, (0.0, duration)),
+            _plot(f"True thermal drift [{unit}]", drifts, (0.0, duration)),
         ]
         right.append(("Temperature", views, len(thermometers)))
     if diagnostics := _diagnostics(entities, sensors):
-        views = [_beside(kind, by_sensor, duration) for kind, by_sensor in diagnostics.items()]
+        views = [_beside(kind, by_sensor, duration, unit) for kind, by_sensor in diagnostics.items()]
         # Plots beside each other have titles of their own below the tabs'.
         n_lines = 1 + max(map(len, next(iter(diagnostics.values())).values()))
         right.append(("Inside the filters", views, n_lines))
@@ -206,9 +210,11 @@ def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, d
     return {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
 
 
-def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float) -> rrb.View | rrb.Container:
-    quantity, unit = DIAGNOSTICS[kind]
-    suffix = f" [{unit}]" if unit else ""
+def _beside(
+    kind: str, contents_of: Mapping[str, Sequence[str]], duration: float, unit: RateUnit
+) -> rrb.View | rrb.Container:
+    quantity, dimension = DIAGNOSTICS[kind]
+    suffix = f" [{dimension.format(unit)}]" if dimension else ""
     plots = [
         _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration), LEGEND * len(contents_of))
         for of, contents in contents_of.items()

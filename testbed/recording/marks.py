@@ -47,7 +47,7 @@ class GateMarks:
         count : ndarray, shape (n_time,)
             Readings that were struck out so far [-].
         rate : ndarray, shape (n_time,)
-            The estimate [rad/s], where the cross is drawn.
+            The estimate as it is shown, where the cross is drawn.
         """
         (rose,) = np.nonzero(np.diff(count, prepend=self._count) > 0.0)
         if count.size:

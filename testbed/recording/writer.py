@@ -7,7 +7,7 @@ import shutil
 import threading
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import rerun as rr
@@ -18,10 +18,12 @@ from testbed.pages.palette import series_colors
 from testbed.recording.channel import Channel
 from testbed.recording.layout import LOG, blueprint
 from testbed.recording.marks import PREFIX, GateMarks
+from testbed.recording.shown import ShownRate
 from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
-from testbed.runs.block import PlayedBlock, clock_of
+from testbed.runs.attributes import unit_of
+from testbed.runs.block import POSE_STRIDE, PlayedBlock, clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 
     from testbed.runs.block import RunBlock
     from testbed.signals import FloatArray
+    from testbed.units import RateUnit
 
 APPLICATION = "testbed"
 FULL = 1 << 20  # bytes; with less room than this a disk is called full
@@ -43,7 +46,8 @@ class RecordingWriter:
     """Write a run to an .rrd file: bodies, rates, errors, temperatures, diagnostics and velocity profiles on the
     timeline `sim_time`.
 
-    A signal has real samples only, in SI: the two extremes of each 4000th of the run, the first and the last sample,
+    Rates are in the unit of the run, which terminal and report show too; all else is in SI but angles, in µrad. A
+    signal has real samples only: the two extremes of each 4000th of the run, the first and the last sample,
     and, if it is a rate or an error, every sample inside `detail`. A lost reading leaves a gap in the line (NaN); what
     is NaN in a diagnostic was not due and is left out.
 
@@ -63,6 +67,8 @@ class RecordingWriter:
         Filters, whose estimates come at the rate of the fastest sensor.
     model : mujoco.MjModel, optional
         Bodies of the turntable; a recording that is replayed has none.
+    unit : {"deg/s", "deg/h"}
+        Of every rate, and squared of its variances.
     settle : float
         Start of the part that is judged [s].
     detail : tuple of float, optional
@@ -90,13 +96,15 @@ class RecordingWriter:
         sensor_rates: Mapping[str, float],
         fusion_names: Sequence[str],
         model: mujoco.MjModel | None,
+        unit: RateUnit,
         settle: float,
         detail: tuple[float, float] | None = None,
-        pose_stride: int = 400,
+        pose_stride: int = POSE_STRIDE,
         times_ns: Mapping[str, NDArray[np.int64]] | None = None,
         live: str | None = None,
     ) -> None:
         self._path, self._live = Path(path), live
+        self._shown = ShownRate(unit)
         self._model, self._pose_stride, self._times = model, pose_stride, times_ns
         self._strides = {name: round(sample_rate_hz / rate) for name, rate in sensor_rates.items()}
         self._fusion_names = list(fusion_names)
@@ -138,36 +146,42 @@ class RecordingWriter:
     def _write_run(self, block: RunBlock) -> None:
         truth = block.truth.rate
         self._moved |= bool(np.any(block.command.rate))
-        self._add("/commanded/rate", block.command.rate[: truth.size], 1, "commanded [rad/s]", "commanded", 1.0)
+        self._add_rate("/commanded/rate", block.command.rate[: truth.size], 1, "commanded", width=1.0)
         self._write_rates(block.sensors, truth)
         for name, temperature in block.temperatures.items():
-            key, drift = f"sensors/{name}", block.drifts[name]
+            key = f"sensors/{name}"
             self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
-            self._add(f"/truth/{name}/drift", drift, 1, f"{name} [rad/s]", key, detailed=False)
+            self._add_rate(f"/truth/{name}/drift", block.drifts[name], 1, key, detailed=False)
         self._write_estimates(block, truth[-block.start % self._fusion_stride :: self._fusion_stride])
         self._write_sights(block)
         self._write_poses(block)
 
     def _write_rates(self, sensors: Mapping[str, FloatArray], truth: FloatArray | None) -> None:
         if truth is not None:
-            self._add("/truth/rate", truth, 1, "truth [rad/s]", "truth")
+            self._add_rate("/truth/rate", truth, 1, "truth")
         for name, readings in sensors.items():
-            key = f"sensors/{name}"
-            self._add(f"/{key}/rate", readings, self._strides[name], f"{name} [rad/s]", key, 1.0)
+            self._add_rate(f"/sensors/{name}/rate", readings, self._strides[name], f"sensors/{name}", width=1.0)
 
     def _write_estimates(self, block: RunBlock | PlayedBlock, reference: FloatArray | None) -> None:
+        stride = self._fusion_stride
         for name, estimate in block.fusion.items():
-            key, stride = f"fusion/{name}", self._fusion_stride
-            self._add(f"/{key}/rate", estimate.rate, stride, f"{name} [rad/s]", key, 2.0)
+            key = f"fusion/{name}"
+            self._add_rate(f"/{key}/rate", estimate.rate, stride, key, width=2.0)
             if reference is not None:
-                self._add(f"/{key}/error", estimate.rate - reference, stride, f"{name} [rad/s]", key)
-            self._add(f"/{key}/std", estimate.std, stride, name, key, detailed=False)
+                self._add_rate(f"/{key}/error", estimate.rate - reference, stride, key)
+            self._add_rate(f"/{key}/std", estimate.std, stride, key, detailed=False)
             for series, values in estimate.diagnostics.items():
-                self._add(f"/{key}/{series}", values, stride, name, key, detailed=False, gaps=False)
+                self._write_diagnostic(key, series, self._shown.of(values, unit_of(key, series)))
                 if series.startswith("gated_"):
                     self._mark(block.start, name, series.removeprefix("gated_"), values, estimate.rate)
-                if series.startswith(("R_", "Q_", "N_")):
-                    self._add(f"/{key}/{LOG}{series}", _log10(values), stride, name, key, detailed=False, gaps=False)
+
+    def _write_diagnostic(self, key: str, series: str, values: FloatArray) -> None:
+        shown = {series: values}
+        if series.startswith(("R_", "Q_", "N_")):
+            shown[LOG + series] = _log10(values)
+        for each, row in shown.items():
+            name = key.removeprefix("fusion/")
+            self._add(f"/{key}/{each}", row, self._fusion_stride, name, key, detailed=False, gaps=False)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -247,6 +261,11 @@ class RecordingWriter:
         else:
             self.abort()
 
+    def _add_rate(self, entity: str, values: FloatArray, stride: int, key: str, **style: Any) -> None:
+        """Add a block of a rate [rad/s]; `style` as of `_add`."""
+        name = f"{key.rpartition('/')[2]} [{self._shown.unit}]"
+        self._add(entity, self._shown.of(values), stride, name, key, **style)
+
     def _add(
         self,
         entity: str,
@@ -282,7 +301,8 @@ class RecordingWriter:
             words = f"{name} struck out {sensor}"
             self._marks[entity] = GateMarks(self._recording, entity, words, self._colors[f"sensors/{sensor}"])
         index = stride * (-(-start // stride) + np.arange(count.size))
-        self._marks[entity].write(self._recording.clock.nanoseconds(index), count, rate)
+        stamps = self._recording.clock.nanoseconds(index)
+        self._marks[entity].write(stamps, count, self._shown.of(rate))
 
     def _write_sights(self, block: RunBlock) -> None:
         if block.pointing and self._target is None:
@@ -303,8 +323,10 @@ class RecordingWriter:
         self._world.write(index, block.truth.poses, block.truth.angle[first :: self._pose_stride])
         for name, (heights, profiles) in block.profiles.items():
             if name not in self._channels:
-                self._channels[name] = Channel(self._recording, name, heights, self._colors[f"sensors/{name}"])
-            self._channels[name].write(index, profiles)
+                self._channels[name] = Channel(
+                    self._recording, name, heights, self._colors[f"sensors/{name}"], self._shown.unit
+                )
+            self._channels[name].write(index, self._shown.of(profiles))
 
     def _blueprint(self, *, live: bool = False) -> rr.blueprint.Blueprint:
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
@@ -317,6 +339,7 @@ class RecordingWriter:
             channels=list(self._channels),
             model=self._model,
             clock=self._recording.clock,
+            unit=self._shown.unit,
             live=live,
         )
 

@@ -53,7 +53,7 @@ def attributes(group: str, name: str) -> dict[str, str]:
             "standard_name": "time",
             "axis": "T",
         }
-    found = {"units": unit_of(name), "long_name": _long_name(group, name)}
+    found = {"units": unit_of(group, name), "long_name": _long_name(group, name)}
     if group.startswith("sensors/"):
         found["comment"] = "NaN where the reading is lost"
     if group.startswith("fusion/") and name == "rate":
@@ -84,11 +84,11 @@ def provenance(scenario: str, seed: int | None, versions: Mapping[str, str]) -> 
     }
 
 
-def unit_of(name: str) -> str:
-    """Return the SI unit of a signal by its name, as UDUNITS writes it."""
+def unit_of(group: str, name: str) -> str:
+    """Return the SI unit of a signal by its group and name, as UDUNITS writes it."""
     if name in _UNITS:
         return _UNITS[name]
-    return _UNITS["rate"] if is_sensor_truth(name) else diagnostic_unit(name)
+    return diagnostic_unit(name) if group.startswith("fusion/") else _UNITS["rate"]
 
 
 def is_precise(name: str) -> bool:

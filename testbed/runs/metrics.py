@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from testbed.errors import Problem, ScenarioError
+from testbed.units import RateUnit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -221,6 +222,17 @@ class PointingMetrics(Entry):
     link: dict[str, float | None] | None = None
 
 
+class ProfileMetrics(Entry):
+    """The fluid of a channel at some instants [s]: rate of the wall, and of the fluid relative to it at every height
+    [m], per radius [deg/s].
+    """
+
+    height_m: list[float]
+    time_s: list[float]
+    wall_deg_s: list[float]
+    slip_deg_s: list[list[float]]
+
+
 class Expectation(Entry):
     """A bound of the scenario on a sensor or filter, the value that was reached and whether it was met."""
 
@@ -309,7 +321,8 @@ class RunMetrics(Entry):
     """The metrics of a run: of every sensor and filter by its name, of the turntable, and what was expected of them.
 
     Of a replayed recording `replay` says what it was, `findings` and `undecided` what the verdict says of it, `cross`
-    what its sensors say of each other; `scenario` is its name, and there is no `seed`.
+    what its sensors say of each other; `scenario` is its name, and there is no `seed`. `rate_unit` is that in which the
+    rates are shown; here they are in deg/s.
 
     Examples
     --------
@@ -323,6 +336,7 @@ class RunMetrics(Entry):
     seed: int | None
     duration_s: float = Field(gt=0)
     settle_s: float = Field(ge=0)
+    rate_unit: RateUnit = "deg/s"
     bandwidth_hz: float | None = None
     turntable: TurntableMetrics | None = None
     sensors: dict[str, SourceMetrics]
@@ -332,6 +346,7 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     responses: Responses | None = None
     pointing: dict[str, PointingMetrics] = {}
+    profiles: dict[str, ProfileMetrics] = {}
     expectations: list[Expectation] = []
     replay: ReplayMetrics | None = None
     findings: list[FindingMetrics] = []

@@ -143,4 +143,4 @@ class MemoryStore:
     def _signals(self, group: str) -> Signals:
         arrays = {name: np.concatenate(parts) for name, parts in self._parts[group].items()}
         stamps = None if self._times is None else self._times.get(clock_of(group))
-        return kept(arrays, {name: unit_of(name) for name in arrays}, self._rate_of[group], stamps)
+        return kept(arrays, {name: unit_of(group, name) for name in arrays}, self._rate_of[group], stamps)

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from testbed.runs.metrics import RunMetrics, SourceMetrics
+    from testbed.units import RateUnit
 
 HEADINGS = ("RMSE", "aligned", "claimed std", "x floor", "x optimum", "mean", "spread")
 NOTHING = "-"
-# A tenth of the Earth's rate [deg/s].
-_SLOW = 1.5 / 3600.0
 # What the arithmetic of a run leaves of a rate is below this [deg/s].
 _RESOLUTION = 1e-12
 
@@ -26,12 +25,13 @@ def error_title(metrics: RunMetrics) -> str:
 
 
 def error_unit(metrics: RunMetrics) -> tuple[str, float]:
-    """Return the unit of every rate that is shown of a run and what deg/s is multiplied by for it: deg/h where all
-    errors are below a tenth of the Earth's rate.
-    """
-    sources = (*metrics.sensors.values(), *metrics.fusion.values())
-    known = [one for source in sources for one in [source.rmse_deg_s or source.spread_deg_s] if one is not None]
-    return ("deg/h", 3600.0) if known and 0.0 < max(known) < _SLOW else ("deg/s", 1.0)
+    """Return the unit of every rate that is shown of a run and what deg/s is multiplied by for it."""
+    return shown_in(metrics.rate_unit)
+
+
+def shown_in(unit: RateUnit) -> tuple[str, float]:
+    """Return a unit of `testbed.units.rate_unit` and what deg/s is multiplied by for it."""
+    return unit, 3600.0 if unit == "deg/h" else 1.0
 
 
 def error_cells(source: SourceMetrics, scale: float) -> list[str]:

@@ -21,7 +21,7 @@ from testbed.models.temperature import ROOM, TemperatureProfile
 from testbed.parts import Part
 from testbed.scenario.edits import edited
 from testbed.signals import BASE_RATE_HZ, random_stream
-from testbed.units import Duration, Frequency, PositiveDuration
+from testbed.units import Duration, Frequency, PositiveDuration, rate_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from testbed.models.turntable.parameters import TurntableParameters
     from testbed.pointing.parameters import PointingParameters
     from testbed.sensors.base import Sensor
+    from testbed.units import RateUnit
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
@@ -227,6 +228,11 @@ class Scenario:
     def lines(self) -> tuple[float, ...]:
         """Commanded line frequencies [Hz], ascending."""
         return tuple(sorted({line for _, motion in self.motion for line in motion.lines()}))
+
+    @property
+    def rate_unit(self) -> RateUnit:
+        """Unit in which every rate of its run is shown."""
+        return rate_unit(sensor.reading_std for sensor in self.sensors.values())
 
     @property
     def detail(self) -> tuple[float, float]:

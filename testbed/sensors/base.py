@@ -324,6 +324,16 @@ class Sensor(Part):
             Two-sided density [rad^2/s].
         """
 
+    @property
+    def reading_std(self) -> float:
+        """Standard deviation of the noise of a reading [rad/s], as if it were white with its density at a quarter of
+        the sample rate; the same with `noise` off.
+        """
+        quarter = np.array([0.25 * self.sample_rate])
+        with np.errstate(all="ignore"):
+            density = self.input_noise_psd(quarter) * np.abs(self.response(quarter)) ** 2
+            return float(np.sqrt(density[0] * self.sample_rate))
+
     @abstractmethod
     def start(self, input_rate_hz: float, seed: int, name: str) -> SensorStage:
         """Return the instrument as it has stood for long under the rate that is on at its first sample, its noise

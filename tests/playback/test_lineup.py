@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from testbed.errors import ScenarioError
 from testbed.playback.lineup import at_instants, line_up
 from testbed.playback.reel import Reel
+from testbed.units import DEG_H
 
 
 def reel(name, rate_hz, n, start_s=0.0, **said):
@@ -105,3 +108,14 @@ def test_nothing_is_known_across_a_gap_of_the_reference():
     found = at_instants(Reel("reference", values, 0, 411.0), reel("fast", 1000.0, 900), 900)
     lost = (np.arange(900) / 1000.0 > 99 / 411.0) & (np.arange(900) / 1000.0 < 120 / 411.0)
     np.testing.assert_array_equal(np.isnan(found), lost)
+
+
+@pytest.mark.parametrize(("noise", "unit"), [(1.0, "deg/h"), (2.0, "deg/s")])
+def test_the_unit_follows_the_noise_of_the_readings_and_not_their_motion(noise, unit):
+    """A tenth of the Earth's rate is 1.5 deg/h; the table turns a thousand times faster, and some readings are lost."""
+    t = np.arange(4000) / 100.0
+    rate = 15_000.0 * np.sin(2e-3 * np.pi * t) + noise * np.random.default_rng(4).standard_normal(t.size)
+    rate[::7] = np.nan
+    made = line_up([reel("fog", 100.0, t.size)], None, "x")
+    assert dataclasses.replace(made, readings={"fog": DEG_H * rate}).rate_unit == unit
+    assert dataclasses.replace(made, readings={"fog": 0.0 * rate}).rate_unit == "deg/s"

@@ -117,6 +117,7 @@ class SyntheticRun:
             "sensor_rates": {"mhd_ars": RATE, "mems_gyro": RATE / GYRO_STRIDE},
             "fusion_names": self.filters,
             "model": mujoco.MjModel.from_xml_string(XML),
+            "unit": "deg/s",
             "settle": 1.0,
             "detail": (1.0, 1.25),
         }

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+import pytest
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
-from testbed.recording.layout import ENTRY, FRAME, ROOM, _rows
+from testbed.recording.layout import DIAGNOSTICS, ENTRY, FRAME, ROOM, _rows, blueprint
+from testbed.recording.stream import Clock
+from testbed.scenario.loader import load_scenario
+from testbed.units import PER_RATE
 from tests.recording.test_live import rows
+from tests.scenario.test_loader import SCENARIOS
 
 
 def row(name, n_lines):
@@ -48,4 +55,46 @@ def test_readings_that_were_struck_out_are_marked_on_the_filters_line(synthetic_
         path = run.record(tmp_path / f"{size}.rrd", size)
         found = rows(path, "/fusion/kalman/struck_mhd_ars")
         np.testing.assert_array_equal(found[:, 0], struck * 50_000)
-        np.testing.assert_array_equal(found[:, 1], run.estimates["kalman"][struck])
+        np.testing.assert_array_equal(found[:, 1], PER_RATE["deg/s"] * run.estimates["kalman"][struck])
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_the_views_of_every_shipped_scenario_have_the_unit_of_its_report(path):
+    """deg/h of the gyro in its thermal chamber, deg/s of all others; nothing of the program's own rad/s."""
+    scenario = load_scenario(path)
+    unit = scenario.rate_unit
+    assert unit == ("deg/h" if path.parent.name == "fog" and path.stem != "fused" else "deg/s")
+    shown = blueprint(
+        entities=entities_of(scenario),
+        sensors=list(scenario.sensors),
+        filters=list(scenario.fusion),
+        channels=["mhd_ars"],
+        model=None,
+        clock=Clock(scenario.base_rate_hz, scenario.n_time, scenario.detail),
+        unit=unit,
+    )
+    names = list(titles(shown.root_container))
+    assert f"Rate, whole run [{unit}]" in names
+    assert not [name for name in names if "rad/s" in name]
+    assert {unit} == {found for name in names for found in re.findall(r"\bdeg/\w+", name)}
+
+
+def entities_of(scenario):
+    """Return the paths of everything that a recording of it may hold."""
+    sensors, filters = list(scenario.sensors), list(scenario.fusion)
+    diagnostics = [kind + sensor for kind in DIAGNOSTICS for sensor in sensors if kind]
+    return [
+        *("/commanded/rate", "/truth/rate", *(f"/sensors/{name}/rate" for name in sensors)),
+        *(f"/sensors/{name}/temperature" for name in sensors),
+        *(f"/truth/{name}/drift" for name in sensors),
+        *(f"/pointing/{name}/residual" for name in filters),
+        *(f"/fusion/{name}/{what}" for name in filters for what in ("rate", "error", "std", *diagnostics)),
+    ]
+
+
+def titles(part):
+    """Yield the name of every view and container below a part of the layout."""
+    yield from filter(None, [getattr(part, "name", None)])
+    for inner in getattr(part, "contents", []):
+        if not isinstance(inner, str):
+            yield from titles(inner)

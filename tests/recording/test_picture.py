@@ -61,10 +61,10 @@ def covered(image, color):
 
 def test_layout_opens_with_its_views_and_without_complaint(shown):
     views = {view.name: view for view in shown.get_state().views}
-    assert {"Turntable", "Fluid velocity profile, mhd_ars", "Rate, whole run [rad/s]"} <= views.keys()
+    assert {"Turntable", "Fluid velocity profile, mhd_ars", "Rate, whole run [deg/s]"} <= views.keys()
     assert {
-        "Error = estimate − truth, every sample from 6 to 6.5 s [rad/s]",
-        "Rate ±50 ms at the cursor [rad/s]",
+        "Error = estimate − truth, every sample from 6 to 6.5 s [deg/s]",
+        "Rate ±50 ms at the cursor [deg/s]",
     } <= views.keys()
     assert [report for view in views.values() for report in view.reports] == []
     recording = shown.get_state().recordings[0]
@@ -75,7 +75,7 @@ def test_layout_opens_with_its_views_and_without_complaint(shown):
 def test_fast_oscillation_is_drawn_with_its_amplitude(shown):
     """A mean of neighbouring samples, the viewer's default, would be a flat line at zero."""
     rows, columns = covered(
-        pixels(settled_picture(shown, "Error = estimate − truth, every sample from 6 to 6.5 s [rad/s]")), FILTERS[0]
+        pixels(settled_picture(shown, "Error = estimate − truth, every sample from 6 to 6.5 s [deg/s]")), FILTERS[0]
     )
     # The plot leaves a margin below for the axis, on the left for the legend, and 5 % above and below the data.
     assert rows > 0.6
@@ -83,7 +83,7 @@ def test_fast_oscillation_is_drawn_with_its_amplitude(shown):
 
 
 def test_detail_shows_all_rates_in_their_colors(shown):
-    image = pixels(settled_picture(shown, "Rate, every sample from 6 to 6.5 s [rad/s]"))
+    image = pixels(settled_picture(shown, "Rate, every sample from 6 to 6.5 s [deg/s]"))
     for color in (SENSORS[0], SENSORS[1], FILTERS[0], TRUTH):
         rows, columns = covered(image, color)
         assert rows > 0.2, color
@@ -99,7 +99,7 @@ def test_lost_readings_are_a_gap_in_the_line(viewer, synthetic_run, tmp_path):
     run.readings["mhd_ars"] = np.full(run.n_time, 0.03)  # above all others
     run.readings["mhd_ars"][124_000:126_000] = np.nan
     show(viewer, run.record(tmp_path / "gap.rrd", settle=6.0, detail=(6.0, 8.0)), 6.2)
-    image = pixels(settled_picture(viewer, "Rate, every sample from 6 to 6.5 s [rad/s]"))
+    image = pixels(settled_picture(viewer, "Rate, every sample from 6 to 6.5 s [deg/s]"))
     blue = image[..., 2] - image[..., 0] > 40  # its edges are mixed with the background
     drawn = np.flatnonzero(blue[blue.sum(axis=1).argmax()])  # the row of pixels of the line, not of the legend
     steps, span = np.diff(drawn), np.ptp(drawn)

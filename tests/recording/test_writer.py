@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -7,11 +8,13 @@ from collections import defaultdict
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
 from testbed.errors import RunError
+from testbed.units import DEG, PER_RATE
 
 N_TIME = 47_003  # 2.35 s: no multiple of a block, of a bin (12 samples) or of the pose stride
 DETAIL = (20_000, 25_000)  # base samples of the window (1 s, 1.25 s), its end included
@@ -59,8 +62,20 @@ def scalars(path):
     return {entity: rows for (entity, name), rows in read(path).items() if name == "Scalars:scalars"}
 
 
-def sources(run):
-    """Entity -> (stride, the array that the chain produced)."""
+def sources(run, factor=PER_RATE["deg/s"]):
+    """Entity -> (stride, the array that the chain produced, in the unit of the recording)."""
+    powers = {"R_mhd_ars": 2, "innovation_mems_gyro": 1, "band_mhd_ars": 0}
+    found = {
+        entity: (stride, factor ** powers.get(entity.rpartition("/")[2], 1) * values)
+        for entity, (stride, values) in produced(run).items()
+    }
+    for name in run.filters:
+        found[f"/fusion/{name}/log10_R_mhd_ars"] = 1, np.log10(found[f"/fusion/{name}/R_mhd_ars"][1])
+    return found
+
+
+def produced(run):
+    """Entity -> (stride, the array that the chain produced [SI])."""
     expected = {
         "/commanded/rate": (1, run.commanded[:-1]),
         "/truth/rate": (1, run.truth),
@@ -108,6 +123,38 @@ def test_every_recorded_sample_is_a_sample_of_its_source_bit_for_bit(run, record
         assert np.all(np.diff(index) > 0), entity
 
 
+def test_slow_rates_are_in_degrees_per_hour_everywhere(run, tmp_path):
+    """Each value by the same product, and no word in the file that names another unit of a rate."""
+    path = run.record(tmp_path / "slow.rrd", unit="deg/h")
+    rows = scalars(path)
+    for entity, (stride, values) in sources(run, PER_RATE["deg/h"]).items():
+        times, recorded = rows[entity]
+        assert np.array_equal(recorded, values[times.astype(np.int64) // (50_000 * stride)]), entity
+    assert rows["/fusion/kalman/std"][1].max() == pytest.approx(1e-4 / DEG * 3600.0)
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
+def test_every_name_and_title_says_the_unit_of_the_run(run, tmp_path, unit):
+    reader = RrdReader(run.record(tmp_path / "named.rrd", unit=unit))
+    said = set()
+    for stream in (reader.stream(), reader.stream(store=reader.blueprints()[0])):
+        for chunk in stream:
+            said |= set(words_of(chunk.to_record_batch()))
+    named = {word for word in said if re.search(r"[a-z]/[sh]\b", word)}
+    assert {f"kalman [{unit}]", f"Rate, whole run [{unit}]", f"Adapted R, mhd_ars [log10 of ({unit})²]"} <= named
+    assert all(unit in word for word in named)
+
+
+def words_of(batch):
+    """Yield every text of a batch."""
+    for column in batch.columns:
+        values = column
+        while hasattr(values, "flatten") and pa.types.is_nested(values.type) and not pa.types.is_struct(values.type):
+            values = values.flatten()
+        if pa.types.is_string(values.type):
+            yield from filter(None, values.to_pylist())
+
+
 def test_first_and_last_sample_are_recorded(run, recording):
     rows = scalars(recording)
     for entity, (stride, values) in sources(run).items():
@@ -138,9 +185,10 @@ def test_spikes_of_one_sample_survive_outside_the_window(synthetic_run, tmp_path
     run.estimates["kalman"][31_415] += 1.0
     run.readings["mems_gyro"][3_333] -= 1.0
     rows = scalars(run.record(tmp_path / "spikes.rrd"))
-    assert run.estimates["kalman"][31_415] in rows["/fusion/kalman/rate"][1]
-    assert run.estimates["kalman"][31_415] - run.truth[31_415] in rows["/fusion/kalman/error"][1]
-    assert run.readings["mems_gyro"][3_333] in rows["/sensors/mems_gyro/rate"][1]
+    per = PER_RATE["deg/s"]
+    assert per * run.estimates["kalman"][31_415] in rows["/fusion/kalman/rate"][1]
+    assert per * (run.estimates["kalman"][31_415] - run.truth[31_415]) in rows["/fusion/kalman/error"][1]
+    assert per * run.readings["mems_gyro"][3_333] in rows["/sensors/mems_gyro/rate"][1]
 
 
 @pytest.mark.parametrize("size", [2_000, 777, 47_003])
@@ -174,12 +222,13 @@ def test_profiles_and_heights_are_those_of_the_channel(run, recording):
     rows = read(recording)
     _, strips = rows["/sensors/mhd_ars/channel/profile", "LineStrips2D:strips"]
     points = strips.reshape(run.index.size, run.heights.size, 2)
-    assert np.array_equal(points[..., 0], run.profiles.astype(np.float32))
+    profiles = PER_RATE["deg/s"] * run.profiles
+    assert np.array_equal(points[..., 0], profiles.astype(np.float32))
     assert np.array_equal(points[..., 1], np.tile(run.heights.astype(np.float32), (run.index.size, 1)))
     times, velocity = rows["/sensors/mhd_ars/channel/velocity", "Scalars:scalars"]
     assert np.array_equal(times.astype(np.int64), run.index * 50_000)
     probes = [np.abs(run.heights - share * 15e-3).argmin() for share in (1 / 32, 1 / 8, 1 / 2)]
-    assert np.array_equal(velocity.reshape(-1, 3), run.profiles[:, probes])
+    assert np.array_equal(velocity.reshape(-1, 3), profiles[:, probes])
 
 
 def test_lines_are_drawn_by_their_extremes_in_explicit_colors(run, recording):
@@ -209,7 +258,7 @@ def test_time_is_exact_at_rates_that_do_not_divide_a_nanosecond(synthetic_run, t
     # Stamps are the nearest nanosecond: (k 1e9 / 30 000) in whole numbers.
     expected = [(k * 1_000_000_000 * 2 + 30_000) // (2 * 30_000) for k in range(18_001)]
     assert np.array_equal(times[:18_001].astype(np.int64), expected)
-    assert np.array_equal(values[:18_001], run.truth[:18_001])
+    assert np.array_equal(values[:18_001], PER_RATE["deg/s"] * run.truth[:18_001])
 
 
 def test_writer_that_fails_leaves_no_file(run, tmp_path):
@@ -246,7 +295,7 @@ def test_estimates_at_the_rate_of_a_slow_sensor_meet_the_truth_of_their_instants
             writer.write(block)
     times, error = scalars(tmp_path / "slow.rrd")["/fusion/kalman/error"]
     assert np.array_equal(times.astype(np.int64), np.arange(0, N_TIME, 10) * 50_000)
-    assert np.array_equal(error, (run.estimates["kalman"] - run.truth)[::10])
+    assert np.array_equal(error, PER_RATE["deg/s"] * (run.estimates["kalman"] - run.truth)[::10])
 
 
 def test_run_without_filters_or_sensors_is_recorded(synthetic_run, tmp_path):
@@ -273,6 +322,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from conftest import SyntheticRun
 from testbed.errors import RunError
+from testbed.units import DEG, PER_RATE
 run = SyntheticRun(47_003)
 try:
     run.record(Path(sys.argv[1]) / "recording.rrd", detail=(0.0, 2.0))
@@ -311,6 +361,7 @@ def test_a_profile_below_the_resolution_draws_no_axes_of_its_own(tmp_path, recwa
     calls = []
     recording = SimpleNamespace(static=lambda *args: calls.append(args), columns=lambda *_: None, stream=None)
     channel = Channel.__new__(Channel)
+    channel._unit = "deg/s"
     channel._largest, channel._heights, channel._color = 1e-90, np.array([0.0, 1e-3]), "#2f86d6"
     channel._recording, channel.entity = recording, "/sensors/mhd_ars/channel"
     channel._batch = SimpleNamespace(flush=lambda: None)

@@ -8,18 +8,16 @@ from testbed.runs.metrics import RunMetrics
 from testbed.runs.table import error_unit, rate_text
 
 
-def metrics(*errors):
-    sources = {f"f{i}": {"rmse_deg_s": error} for i, error in enumerate(errors)}
-    return RunMetrics(scenario="a", seed=1, duration_s=1.0, settle_s=0.0, sensors={}, fusion=sources)
+@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
+def test_the_unit_is_that_of_the_run(unit):
+    metrics = RunMetrics(scenario="a", seed=1, duration_s=1.0, settle_s=0.0, sensors={}, fusion={}, rate_unit=unit)
+    assert error_unit(metrics) == (unit, {"deg/s": 1.0, "deg/h": 3600.0}[unit])
 
 
-@pytest.mark.parametrize(
-    ("errors", "unit"),
-    [((1e-5, 1e-4), "deg/h"), ((1e-5, 1e-3), "deg/s"), ((), "deg/s"), ((None,), "deg/s"), ((0.0,), "deg/s")],
-    ids=["slow", "one fast", "none", "undefined", "exact"],
-)
-def test_the_unit_is_that_of_all_errors_together(errors, unit):
-    assert error_unit(metrics(*errors))[0] == unit
+def test_a_run_of_before_is_in_deg_s():
+    assert (
+        error_unit(RunMetrics(scenario="a", seed=1, duration_s=1.0, settle_s=0.0, sensors={}, fusion={}))[0] == "deg/s"
+    )
 
 
 @pytest.mark.parametrize(

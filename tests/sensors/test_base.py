@@ -25,6 +25,15 @@ def test_every_preset_is_an_instrument(name: str) -> None:
     assert np.all(sensor.input_noise_psd(freq) > 0.0)
 
 
+@pytest.mark.contract
+@pytest.mark.parametrize("name", PRESETS)
+def test_reading_std_is_about_that_of_the_readings_at_rest(name: str) -> None:
+    """Within a factor of two of their steps over root two, which slow noise does not reach."""
+    sensor = load_preset(name)
+    steps = np.diff(sensor.sample(np.zeros(1000 * round(20_000.0 / sensor.sample_rate)), 20_000.0))
+    assert sensor.reading_std / 2.0 < np.std(steps) / np.sqrt(2.0) < 2.0 * sensor.reading_std
+
+
 def test_presets_cover_every_sensor() -> None:
     assert {type(load_preset(name)).__module__ for name in PRESETS} == {t.split(":")[0] for t in SENSORS.values()}
 
