@@ -324,7 +324,12 @@ def main() -> None:
     """Print the table asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10, help="how many")
-    parser.add_argument("--duration", type=float, default=20.0, help="of a run in s")
+    parser.add_argument(
+        "--duration",
+        type=float,
+        default=20.0,
+        help="of a record in s; judged are its second quarter and its second half",
+    )
     parser.add_argument("--signals", nargs="+", default=list(signals()), choices=list(signals()), metavar="SIGNAL")
     parser.add_argument("--start", choices=("unknown", "rest"), default="unknown", help="of the records")
     parser.add_argument("--csv", type=Path, help="where to write the table")
