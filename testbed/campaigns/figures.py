@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from testbed.campaigns.rows import RESIDUAL
 from testbed.pages.axes import WIDTH_IN, arrange, label, marked
 from testbed.pages.palette import Mark, color_of, series_marks
 from testbed.pages.svg import INK, STYLE
@@ -42,6 +43,8 @@ def figures_of(found: Summary, axes: Sequence[str]) -> dict[str, Figure]:
     with mpl.rc_context(STYLE):
         if numeric:
             drawn["errors"] = _curves(found, numeric[0])
+            if any(point.sight for points in found.points.values() for point in points):
+                drawn["sight"] = _sight(found, numeric[0])
             if any(np.isfinite(point.gain[1]) for points in found.points.values() for point in points):
                 drawn["response"] = _response(found, numeric[0])
         if len(numeric) > 1 and any(kind == "filter" for kind, _ in found.points):
@@ -95,6 +98,31 @@ def _curves(found: Summary, key: str) -> Figure:
     _scale(axes, key, x)
     axes.set_yscale("log")
     axes.set_ylabel("RMSE [deg/s]")
+    axes.grid(visible=True)
+    arrange(figure, handles)
+    return figure
+
+
+def _sight(found: Summary, key: str) -> Figure:
+    """Draw what each filter leaves of the line of sight, with its interval."""
+    figure = Figure(figsize=(WIDTH_IN, 3.8))
+    axes = figure.subplots()
+    handles: list[Line2D | Patch] = []
+    marks = _marks(found)
+    for (kind, name), points in found.points.items():
+        along = _along([point for point in points if RESIDUAL in point.sight], key)
+        if not along:
+            continue
+        x = [value for value, _ in along]
+        ends = [[_rms([point.sight[RESIDUAL][k] for point in group]) for _, group in along] for k in range(3)]
+        color = color_of(f"{_ROOMS[kind]}/{name}")
+        style = marked(marks[kind, name], color, len(x))
+        handles += axes.plot(x, ends[1], color=color, linewidth=1.9, label=label(name), **style)
+        if np.isfinite(ends[0]).all():
+            axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
+    _scale(axes, key, x)
+    axes.set_yscale("log")
+    axes.set_ylabel("residual [µrad]")
     axes.grid(visible=True)
     arrange(figure, handles)
     return figure
