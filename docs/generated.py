@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import re
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _LONGEST = 60
+_STANDINGS = (
+    *("filter", "error over optimum", "95 %", "worst", "where", "claims hold", "error over claim"),
+    *("time over kalman's", "line of sight [urad]"),
+)
 _OTHERS = re.compile(r"\n(?:Examples|Raises|References|Notes)\n---")
 # A bar outside of a formula, and the mark of a reference.
 _BAR, _CITED = re.compile(r"(?<![`\\])\|(?![^`\n]*`)"), re.compile(r"\s*\[\d+\]_")
@@ -62,14 +67,15 @@ def leaderboard() -> str:
     parts = [
         "# Leaderboard: the table\n",
         "What the columns mean, how a filter enters and how the table is cited: [leaderboard](../../leaderboard.md).\n",
-        "| filter | error over optimum | 95 % | worst | where | claims hold | error over claim | time over kalman's |",
-        "|---|---|---|---|---|---|---|---|",
+        f"| {' | '.join(_STANDINGS)} |",
+        f"|{'---|' * len(_STANDINGS)}",
     ]
     for one in order:
         claims = f"{100 * one.honest:.0f} % | {one.error_over_claim:.3g}"
         cost = "" if one.cost is None else f"{one.cost:.2g}"
         error = f"{one.over_optimum:.3g} | {one.lower:.3g} to {one.upper:.3g} | {one.worst:.3g} | {one.worst_case}"
-        parts.append(f"| `{one.name}` | {error} | {claims} | {cost} |")
+        sight = "" if math.isnan(one.residual) else f"{one.residual:.3g}"
+        parts.append(f"| `{one.name}` | {error} | {claims} | {cost} | {sight} |")
     cases, seeds = {tuple(row[axis] for axis in AXES) for row in rows}, {row["seed"] for row in rows}
     parts += ["", f"{len(cases)} cases, {len(seeds)} seeds each.\n", "## Entries\n"]
     parts += [

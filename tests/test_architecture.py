@@ -33,7 +33,7 @@ ROOMS = {
     "pointing": {"metrics", "fusion"},
     "runs": {"models", "fusion", "pointing"},
     "scenario": {"models", "sensors", "fusion", "pointing"},
-    "report": {"pages", "metrics", "runs"},
+    "report": {"pages", "metrics", "allan", "runs"},
     "recording": {"pages", "metrics", "runs"},
     "identification": {"fusion", "logs", "metrics", "pages"},
     "notebook": {"pages", "runs", "report"},
@@ -47,7 +47,7 @@ ROOMS = {
         *("report", "recording", "notebook", "chain"),
     },
     "campaigns": {"chain", "judging", "scenario", "models", "sensors", "fusion", "metrics", "runs", "pages"},
-    "design": {"scenario", "sensors", "fusion", "models", "pointing", "pages"},
+    "design": {"campaigns", "scenario", "sensors", "fusion", "models", "pointing", "pages", "runs"},
     "drift": {"compensation", "logs", "allan", "judging", "pages", "runs", "models"},
 }
 # These join everything: the papers know all but the chain and the command line, nobody knows the command line.

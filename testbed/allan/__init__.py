@@ -2,6 +2,7 @@
 
 from testbed.allan.curve import allan_deviation
 from testbed.allan.fit import AllanFit, Coefficient, Goodness, fit_allan
+from testbed.allan.octaves import AllanOctaves
 from testbed.allan.types import AllanCurve
 
-__all__ = ["AllanCurve", "AllanFit", "Coefficient", "Goodness", "allan_deviation", "fit_allan"]
+__all__ = ["AllanCurve", "AllanFit", "AllanOctaves", "Coefficient", "Goodness", "allan_deviation", "fit_allan"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.campaigns.rows import OK
+from testbed.campaigns.rows import OK, RESIDUAL, WINDOWED
 from testbed.campaigns.statistics import Comparison, rank, rms_interval
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Point:
     """One source in one case over its seeds: RMSE with interval, bounds [deg/s], NEES [-], first line's gain [-] and
-    phase [deg]; NaN where undefined.
+    phase [deg]; NaN where undefined. `sight` has the errors of the line of sight with their intervals [urad].
     """
 
     case: int
@@ -37,6 +37,7 @@ class Point:
     gain: tuple[float, float, float]
     phase: tuple[float, float, float]
     first_seed: int
+    sight: Mapping[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,9 @@ def summarise(table: pa.Table, axes: Sequence[str]) -> Summary:
 
 def _point(case: int, rows: list[dict[str, Any]], axes: Sequence[str]) -> Point:
     first = rows[0]
-    squares = _column(rows, "rmse_deg_s") ** 2
-    lower, rmse, upper = rms_interval(squares[np.isfinite(squares)]) if np.isfinite(squares).any() else (np.nan,) * 3
+    lower, rmse, upper = _rms(_column(rows, "rmse_deg_s"))
+    aimed = [name for name in first if name == RESIDUAL or name.startswith(WINDOWED)]
+    sight = {name: _rms(_column(rows, name)) for name in aimed}
     claimed = _column(rows, "mean_std_deg_s")
     lines = [row["lines"][0] if row["lines"] else {} for row in rows]
     return Point(
@@ -91,7 +93,14 @@ def _point(case: int, rows: list[dict[str, Any]], axes: Sequence[str]) -> Point:
         gain=_interval(_column(lines, "gain")),
         phase=_interval(_column(lines, "phase_deg")),
         first_seed=first["seed"],
+        sight={name: one for name, one in sight.items() if np.isfinite(one[1])},
     )
+
+
+def _rms(errors: FloatArray) -> tuple[float, float, float]:
+    """Return the rms over seeds with its 95 % interval, NaN if there is none."""
+    known = errors[np.isfinite(errors)]
+    return rms_interval(known**2) if known.size else (np.nan, np.nan, np.nan)
 
 
 def _column(rows: Sequence[Mapping[str, Any]], name: str) -> FloatArray:

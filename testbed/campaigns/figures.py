@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import WIDTH_IN, arrange, label
-from testbed.pages.palette import color_of
+from testbed.campaigns.rows import RESIDUAL
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.palette import Mark, color_of, series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from testbed.campaigns.curves import Point, Summary
 
-_DASHES = ("-", (0, (7, 1.5)), (0, (3, 1.2)), (0, (7, 1.2, 1.5, 1.2)))
 _DOTTED = (0, (1.2, 2.2))
 _ROOMS = {"sensor": "sensors", "filter": "fusion"}
 # Ends of an axis that are further apart than this ratio are drawn on a logarithmic one.
@@ -43,6 +43,8 @@ def figures_of(found: Summary, axes: Sequence[str]) -> dict[str, Figure]:
     with mpl.rc_context(STYLE):
         if numeric:
             drawn["errors"] = _curves(found, numeric[0])
+            if any(point.sight for points in found.points.values() for point in points):
+                drawn["sight"] = _sight(found, numeric[0])
             if any(np.isfinite(point.gain[1]) for points in found.points.values() for point in points):
                 drawn["response"] = _response(found, numeric[0])
         if len(numeric) > 1 and any(kind == "filter" for kind, _ in found.points):
@@ -73,25 +75,26 @@ def _curves(found: Summary, key: str) -> Figure:
     axes = figure.subplots()
     handles: list[Line2D | Patch] = []
     bounds: dict[str, list[float]] = {}
-    for i, ((kind, name), points) in enumerate(found.points.items()):
+    marks = _marks(found)
+    for (kind, name), points in found.points.items():
         along = _along(points, key)
         x = [value for value, _ in along]
         color, width = color_of(f"{_ROOMS[kind]}/{name}"), 0.9 if kind == "sensor" else 1.9
         columns = [
             [_rms([getattr(point, end) for point in group]) for _, group in along] for end in ("rmse", "lower", "upper")
         ]
-        dashes = _DASHES[i % len(_DASHES)]
-        handles += axes.plot(x, columns[0], color=color, linewidth=width, linestyle=dashes, label=label(name))
+        style = marked(marks[kind, name], color, len(x))
+        handles += axes.plot(x, columns[0], color=color, linewidth=width, label=label(name), **style)
         if np.isfinite(columns[1]).all():
             axes.fill_between(x, columns[1], columns[2], color=color, alpha=0.18, linewidth=0)
         if kind == "filter":
             for bound in ("floor", "optimum"):
                 bounds.setdefault(bound, [_rms([getattr(point, bound) for point in group]) for _, group in along])
-    for (bound, values), style in zip(bounds.items(), (_DOTTED, (0, (4, 2))), strict=False):
+    for (bound, values), dash in zip(bounds.items(), (_DOTTED, (0, (4, 2))), strict=False):
         if np.isfinite(values).any():
-            axes.plot(x, values, color=INK, linewidth=1.4, linestyle=style)
+            axes.plot(x, values, color=INK, linewidth=1.4, linestyle=dash)
             words = {"floor": "noise floor", "optimum": "optimum of each case"}[bound]
-            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=style, label=words))
+            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dash, label=words))
     _scale(axes, key, x)
     axes.set_yscale("log")
     axes.set_ylabel("RMSE [deg/s]")
@@ -100,19 +103,53 @@ def _curves(found: Summary, key: str) -> Figure:
     return figure
 
 
+def _sight(found: Summary, key: str) -> Figure:
+    """Draw what each filter leaves of the line of sight, with its interval."""
+    figure = Figure(figsize=(WIDTH_IN, 3.8))
+    axes = figure.subplots()
+    handles: list[Line2D | Patch] = []
+    marks = _marks(found)
+    for (kind, name), points in found.points.items():
+        along = _along([point for point in points if RESIDUAL in point.sight], key)
+        if not along:
+            continue
+        x = [value for value, _ in along]
+        ends = [[_rms([point.sight[RESIDUAL][k] for point in group]) for _, group in along] for k in range(3)]
+        color = color_of(f"{_ROOMS[kind]}/{name}")
+        style = marked(marks[kind, name], color, len(x))
+        handles += axes.plot(x, ends[1], color=color, linewidth=1.9, label=label(name), **style)
+        if np.isfinite(ends[0]).all():
+            axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
+    _scale(axes, key, x)
+    axes.set_yscale("log")
+    axes.set_ylabel("residual [µrad]")
+    axes.grid(visible=True)
+    arrange(figure, handles)
+    return figure
+
+
+def _marks(found: Summary) -> dict[tuple[str, str], Mark]:
+    """Return dashes and marker of every source."""
+    groups = {(kind, name): f"{_ROOMS[kind]}/{name}" for kind, name in found.points}
+    marks = series_marks(groups.values())
+    return {key: marks[group] for key, group in groups.items()}
+
+
 def _response(found: Summary, key: str) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, 5.6))
     panels = figure.subplots(2, 1, sharex=True)
     handles: list[Line2D | Patch] = []
-    for i, ((kind, name), points) in enumerate(found.points.items()):
+    marks = _marks(found)
+    for (kind, name), points in found.points.items():
         along = _along(points, key)
         x = [value for value, _ in along]
-        color, dashes = color_of(f"{_ROOMS[kind]}/{name}"), _DASHES[i % len(_DASHES)]
+        color = color_of(f"{_ROOMS[kind]}/{name}")
+        style = marked(marks[kind, name], color, len(x))
         for axes, part in zip(panels, ("gain", "phase"), strict=True):
             ends = [
                 [float(np.mean([getattr(point, part)[k] for point in group])) for _, group in along] for k in range(3)
             ]
-            lines = axes.plot(x, ends[1], color=color, linewidth=1.5, linestyle=dashes, label=label(name))
+            lines = axes.plot(x, ends[1], color=color, linewidth=1.5, label=label(name), **style)
             if np.isfinite(ends[0]).all():
                 axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
         handles += lines

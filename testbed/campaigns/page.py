@@ -10,6 +10,7 @@ from testbed.campaigns.figures import figures_of
 from testbed.campaigns.store import read_cases
 from testbed.pages.template import render
 from testbed.runs.atomic import write_text
+from testbed.runs.table import metric_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,12 +49,15 @@ class Page:
         study = self._study
         table = read_cases(self._folder)
         found = summarise(table, study.axes)
+        aimed = [name for points in found.points.values() for point in points for name in point.sight]
         seeds = sum(point.n_seed for point in next(iter(found.points.values()), ()))
         text = render(
             "sweep.html.j2",
             figures_of(found, study.axes),
             study=study,
             found=found,
+            sights=list(dict.fromkeys(aimed)),
+            metric_text=metric_text,
             n_done=seeds,
             n_runs=len(study.cases) * len(study.seeds),
             repeat=f"{study.command} --only",

@@ -27,6 +27,8 @@ NUMBERS = (
     "optimum_rmse_deg_s",
     "optimum_settled_deg_s",
 )
+# Of each line of sight; the second kind for each window.
+RESIDUAL, WINDOWED = "residual_rms_urad", ("rpe_urad", "mpe_urad")
 _LINE = ("frequency_hz", "gain", "phase_deg", "error_deg_s", "optimum_deg_s")
 _MOST_REASON = 2000
 
@@ -70,7 +72,7 @@ def schema_of(study: Study) -> pa.Schema:
 
 
 def pointing_columns(cases: Sequence[Variation]) -> list[str]:
-    """Return the columns of the line of sight: its residual, and RPE over every window of any case [urad].
+    """Return the columns of the line of sight: its residual, RPE and MPE over every window of any case [urad].
 
     Parameters
     ----------
@@ -78,8 +80,8 @@ def pointing_columns(cases: Sequence[Variation]) -> list[str]:
         Of the study; without pointing the columns are null.
     """
     aimed = [case.scenario.pointing for case in cases if case.scenario.pointing is not None]
-    windows = {window.key for pointing in aimed for window in pointing.windows}
-    return ["residual_rms_urad", *(f"rpe_urad.{key}" for key in sorted(windows, key=float))]
+    windows = sorted({window.key for pointing in aimed for window in pointing.windows}, key=float)
+    return [RESIDUAL, *(f"{kind}.{key}" for kind in WINDOWED for key in windows)]
 
 
 def in_si(scenario: Scenario, key: str, written: Any) -> float | str | None:
@@ -162,10 +164,8 @@ def _sight(metrics: RunMetrics, name: str) -> dict[str, float | None]:
     sight = metrics.pointing.get(name)
     if sight is None:
         return {}
-    return {
-        "residual_rms_urad": sight.residual_rms_urad,
-        **{f"rpe_urad.{key}": value for key, value in sight.rpe_urad.items()},
-    }
+    windowed = {f"{kind}.{key}": value for kind in WINDOWED for key, value in sight[kind].items()}
+    return {RESIDUAL: sight.residual_rms_urad, **windowed}
 
 
 def _row(source: SourceMetrics) -> dict[str, Any]:

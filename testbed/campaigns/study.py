@@ -119,7 +119,7 @@ class Variation:
 @dataclass(frozen=True)
 class Study:
     """A validated study: `cases` in order, and `seeds`, of which a case with `precision` may need only the first;
-    `command` is what plays it.
+    `command` is what plays it, `code` a hash of that where it matters which code began the folder.
     """
 
     name: str
@@ -130,6 +130,7 @@ class Study:
     seeds: tuple[int, ...]
     precision: float | None = None
     command: str = ""
+    code: str = ""
 
     def document(self) -> dict[str, Any]:
         """Return what the study is, as its folder keeps it: two that differ in it do not continue each other."""
@@ -139,6 +140,7 @@ class Study:
             "cases": [{"values": dict(case.values), "scenario_sha256": case.sha256} for case in self.cases],
             "seeds": list(self.seeds),
             "precision": self.precision,
+            "code": self.code,
         }
 
 

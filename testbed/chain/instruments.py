@@ -9,12 +9,11 @@ import numpy as np
 from testbed.chain.logger import Logger
 from testbed.chain.onset import LateFilter, Onset
 from testbed.chain.pointing import LinesOfSight
-from testbed.chain.truth import POSE_STRIDE
 from testbed.errors import RunError
 from testbed.fusion import FILTERS
 from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError
-from testbed.runs.block import RunBlock
+from testbed.runs.block import POSE_STRIDE, RunBlock
 from testbed.sensors import SENSORS
 from testbed.sensors.checked import CheckedSensor
 from testbed.sensors.stages import ExposedStage, ProfiledStage, Surroundings, ThermalStage

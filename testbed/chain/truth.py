@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from testbed.models.turntable.turntable import Turntable
+from testbed.runs.block import POSE_STRIDE
 from testbed.scenario.step_choice import choose_step, exposed
 
 if TYPE_CHECKING:
     from testbed.models.motion import CommandBlock
     from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
-
-POSE_STRIDE = 400
 
 
 class Truth:

@@ -1,56 +1,60 @@
-"""What the command line prints of a design, and what it writes of it."""
+"""What the command line prints of a design."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
-
-from ruamel.yaml import YAML
 
 from testbed.cli.console import ruled, terminal
 from testbed.runs.table import metric_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from testbed.cli.options import Output
+    from testbed.design.proof import Proof
     from testbed.design.requirement import Requirement
     from testbed.design.search import Candidate, Design
 
-# Student's t, two-sided 95 %, for 2 to 10 seeds.
-_T95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
 
-
-def prove(requirement: Requirement, candidate: Candidate, seeds: int) -> dict[str, dict[str, Any]]:
-    """Return what a chain really leaves, by metric: values of each seed, mean and half its 95 % interval [urad].
+def prove(
+    requirement: Requirement,
+    candidate: Candidate,
+    folder: Path,
+    *,
+    seeds: int,
+    workers: int,
+    plugins: Iterable[str],
+    output: Output,
+) -> dict[str, Proof]:
+    """Sweep a candidate over several seeds into ``proof`` of a folder, and return what came of it by metric.
 
     Parameters
     ----------
     requirement : Requirement
-        Where its parts are from.
+        What is asked.
     candidate : Candidate
         Which.
-    seeds : int
-        Of the sensors' noise; 2 to 10.
+    folder : Path
+        Where its scenario was written.
+    seeds, workers : int
+        Of the sweep.
+    plugins : iterable of str
+        As for `load_study`.
+    output : Output
+        Where the words go.
     """
-    from testbed.campaigns.evaluate import evaluate
-    from testbed.design.search import chosen_scenario
-    from testbed.judging.sights import pointing_value
-    from testbed.scenario.model import Scenario
+    from testbed.campaigns.sweep import sweep
+    from testbed.cli.progress import sweeping
+    from testbed.design.proof import proof_study, read_proof
 
-    frame = requirement.scenario.frame
-    keys = {**chosen_scenario(requirement, candidate), "truth_seed": frame.seed}
-    scenario = Scenario.from_dict(keys, requirement.scenario.folder)
-    drawn = evaluate(scenario, range(frame.seed, frame.seed + seeds))
-    rows = [metrics.pointing[candidate.blend] for metrics in drawn]
-    found = {}
-    for metric, expected in candidate.values.items():
-        values = [float(pointing_value(row, metric) or math.nan) for row in rows]
-        mean = math.fsum(values) / seeds
-        spread = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (seeds - 1))
-        half = _T95[seeds - 2] * spread / math.sqrt(seeds)
-        found[metric] = {"values": values, "mean": mean, "ci95": half, "by_spectra": expected}
-    return found
+    study, place = proof_study(requirement, candidate, seeds, folder, list(plugins)), folder / "proof"
+    if output.quiet:
+        sweep(study, workers=workers, out=place)
+    else:
+        with sweeping(study.name) as told:
+            sweep(study, workers=workers, out=place, progress=told)
+    return read_proof(requirement, candidate, place)
 
 
 def print_design(requirement: Requirement, design: Design) -> None:
@@ -80,18 +84,22 @@ def print_design(requirement: Requirement, design: Design) -> None:
         console.print(f"left out: {name}: {reason}", soft_wrap=True, highlight=False)
 
 
-def print_proof(proof: dict[str, dict[str, Any]]) -> None:
+def print_proof(proof: Mapping[str, Proof]) -> None:
     """Print what the runs made of the chosen chain beside its spectra.
 
     Parameters
     ----------
-    proof : dict
-        As `prove` has it.
+    proof : mapping of str to Proof
+        By metric.
     """
-    table = ruled("", "by spectra", "simulated", "95 %", title="proof: urad over seeds")
+    seeds = max((row.n_seed for row in proof.values()), default=0)
+    heads = ("", "by spectra", "simulated", "95 %", "asked", "")
+    table = ruled(*heads, title=f"proof: urad rms over {seeds} seeds of the sensors' noise")
+    words = {None: "", True: "proven", False: "not proven"}
     for metric, row in proof.items():
-        cells = (f"{row[key]:.4g}" for key in ("by_spectra", "mean", "ci95"))
-        table.add_row(metric_text(metric), *cells)
+        limits = f"{row.lower:.4g} to {row.upper:.4g}"
+        numbers = f"{row.by_spectra:.4g}", f"{row.value:.4g}", limits
+        table.add_row(metric_text(metric), *numbers, row.asked or "", words[row.proven])
     terminal().print(table)
 
 
@@ -115,26 +123,3 @@ def candidate_rows(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
         }
         for one in candidates
     ]
-
-
-def write_chosen(requirement: Requirement, candidate: Candidate, path: Path) -> Path:
-    """Write the scenario that plays a candidate.
-
-    Parameters
-    ----------
-    requirement : Requirement
-        Where its parts are from.
-    candidate : Candidate
-        Which.
-    path : Path
-        The file.
-    """
-    from testbed.design.search import chosen_scenario
-
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = False
-    yaml.sort_base_mapping_type_on_output = False
-    with path.open("w", encoding="utf-8") as stream:
-        stream.write(f"# chosen by `testbed design`: {candidate.name}, cost {candidate.cost:g}\n")
-        yaml.dump(chosen_scenario(requirement, candidate), stream)
-    return path

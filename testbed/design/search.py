@@ -157,9 +157,11 @@ def chosen_scenario(requirement: Requirement, candidate: Candidate) -> dict[str,
     candidate : Candidate
         Which.
     """
-    written = requirement.written
+    written, seed = requirement.written, requirement.scenario.frame.seed
     expect = {bound.metric: f"{bound.relation} {bound.limit!r}" for bound in requirement.bounds}
     return {
+        # The motion that was designed for, whatever noise the sensors have.
+        "truth_seed": seed,
         **written["frame"],
         "sensors": {name: written["sensors"][name] for name in candidate.sensors},
         "fusion": {candidate.blend: written["fusion"][candidate.blend]},

@@ -249,6 +249,11 @@ class BlockFilter:
         """
         return self.estimated(*self.received(readings, time_ns))
 
+    def front(self) -> tuple[Any, ...]:
+        """Return what `received` depends on beside the readings so far: filters with an equal one receive the same."""
+        gate = None if self._gate is None else self._gate.key()
+        return self.schedule.sensors, self.schedule.rates_hz, self._bias.tobytes(), gate
+
     def received(self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None = None) -> Received:
         """Return the readings of the next block as the filter sees them, and how many were struck out so far.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.judging.case import CaseFacts
+from testbed.judging.profiles import ProfileKeeper
 from testbed.judging.sights import pointing_judges, pointing_value
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
@@ -58,6 +59,7 @@ class Judge:
         self._consistency = {name: Consistency() for name in scenario.fusion}
         self._gated: dict[str, dict[str, int]] = {}
         self._sights = pointing_judges(scenario, rates["base"])
+        self._profiles = ProfileKeeper(scenario)
 
     def write(self, block: RunBlock) -> None:
         """Add a block."""
@@ -74,6 +76,7 @@ class Judge:
             self._consistency[name].add(error, estimate.std[settled:], estimate.diagnostics, settled)
         for name, sight in block.pointing.items():
             self._sights[name].process(sight, block.truth.rate)
+        self._profiles.write(block)
 
     def _add(self, name: str, rate: FloatArray, std: FloatArray | None) -> tuple[FloatArray, int]:
         """Add a block of readings or estimates; return the error after `settle`, and at which sample of the block that
@@ -117,6 +120,7 @@ class Judge:
             for line in row["lines"]:
                 line["optimum_deg_s"] = of_lines.get(line["frequency_hz"])
         sights = {name: sight.result() for name, sight in self._sights.items()}
+        profiles = self._profiles.result()
         found = {
             "scenario": self._scenario.name,
             "seed": frame.seed,
@@ -130,6 +134,7 @@ class Judge:
             "bounds_reason": self._case.reason(why),
             **self._case.pages,
             **({"pointing": sights} if sights else {}),
+            **({"profiles": profiles} if profiles else {}),
             "expectations": self._expectations({**sensors, **fusion}, sights),
             "versions": dict(versions or {}),
         }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
 
 from testbed.pages.numbers import decade, plain, significant
+from testbed.pages.svg import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
     from testbed.pages.envelope import Envelope
+    from testbed.pages.palette import Mark
 
 WIDTH_IN = 9.2
 DEGREE = float(np.degrees(1.0))
@@ -25,12 +27,56 @@ HOURS_FROM = 7200.0
 HOUR_STEPS = (0.5, 1.0, 2.0, 3.0, 6.0, 12.0, 24.0)
 
 
-def draw(axes: Axes, envelope: Envelope, color: str, width: float, alpha: float = 1.0, scale: float = DEGREE) -> None:
-    """Fill between the extremes, times `scale`, with an outline so that a quiet signal is still a line."""
+# Marks on a line.
+_N_MARKS = 7
+
+
+def draw(
+    axes: Axes,
+    envelope: Envelope,
+    color: str,
+    width: float,
+    alpha: float = 1.0,
+    scale: float = DEGREE,
+    mark: Mark | None = None,
+) -> None:
+    """Fill between the extremes, times `scale`, with an outline so that a quiet signal is still a line; a few marks
+    tell it from others where there is no colour.
+    """
     low, high = scale * envelope.low, scale * envelope.high
     axes.fill_between(
         envelope.time, low, high, facecolor=color, edgecolor=color, linewidth=width, alpha=alpha, joinstyle="round"
     )
+    if mark is not None:
+        style = marked(mark, color, envelope.time.size) | {"linestyle": "none"}
+        axes.plot(envelope.time, (low + high) / 2.0, color=color, **style)
+
+
+def marked(mark: Mark, color: str, n_points: int | None = None) -> dict[str, Any]:
+    """Return dashes and mark of a line as matplotlib takes them; of many points a few are marked, each line elsewhere.
+
+    Parameters
+    ----------
+    mark : Mark
+        Of the name.
+    color : str
+        Of the line; a rim in the colour of the text sets a solid mark off from a filled area.
+    n_points : int, optional
+        Points of the line; without it every one has a mark, as in a legend.
+    """
+    rimmed = mark.marker not in "x+12"
+    style: dict[str, Any] = {
+        "linestyle": mark.dash,
+        "marker": mark.marker,
+        "markersize": 4.5 if rimmed else 6.0,
+        "markeredgecolor": INK if rimmed else color,
+        "markeredgewidth": 0.6 if rimmed else 1.3,
+        "markerfacecolor": color,
+    }
+    if n_points is not None:
+        step = max(1, n_points // _N_MARKS)
+        style["markevery"] = (int((0.3 + 0.37 * mark.turn) % 1.0 * step), step)
+    return style
 
 
 def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:

@@ -1,14 +1,18 @@
-"""One colour per signal, the same in the recording and in the report, legible on a dark and on a light background."""
+"""One colour per signal, the same in the recording and in the report, legible on a dark and on a light background; and
+beside the colour dashes and a mark, for who prints in grey.
+"""
 
 from __future__ import annotations
 
 import colorsys
 import hashlib
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
+
+Dash = tuple[float, tuple[float, ...] | None]
 
 COMMANDED = "#7d8894"
 TRUTH = "#b07d12"
@@ -41,6 +45,17 @@ NAMED = {
 _HUES = {"sensors": (0.47, 0.73), "fusion": (0.77, 1.42), "columns": (0.0, 1.0)}
 # Axes of a recording: red, green and blue everywhere.
 _AXES = {"x": FILTERS[2], "y": FILTERS[0], "z": SENSORS[0]}
+# Colours are equally light, so in grey they are one: dashes and marks tell the names apart. The numbers of both have no
+# common factor, so that all their pairs differ.
+DASHES: tuple[Dash, ...] = (
+    (0, None),
+    (0, (7, 1.5)),
+    (0, (3, 1.2)),
+    (0, (7, 1.2, 1.5, 1.2)),
+    (0, (10, 1.2, 1.5, 1.2, 1.5, 1.2)),
+)
+_OPEN, _SOLID = ("x", "+", "1", "2"), ("o", "s", "^", "D", "v", "P", "*", "<", "X", ">", "p", "h")
+_MARKERS = {"sensors": _OPEN, "fusion": _SOLID, "columns": _SOLID}
 # Relative luminance that stands out 3:1 on white and on the viewer's dark background.
 _LUMINANCE = 0.2
 
@@ -96,6 +111,51 @@ def series_colors(sensor_names: Sequence[str], fusion_names: Sequence[str]) -> d
     colors = {"commanded": COMMANDED, "truth": TRUTH}
     keys = [*(f"sensors/{name}" for name in sensor_names), *(f"fusion/{name}" for name in fusion_names)]
     return colors | {key: color_of(key) for key in keys}
+
+
+class Mark(NamedTuple):
+    """How the line of a signal is dashed and marked, and its place among those that it is drawn with."""
+
+    dash: Dash
+    marker: str
+    turn: int
+
+
+def series_marks(groups: Iterable[str]) -> dict[str, Mark]:
+    """Return dashes and marker of every sensor and filter: no two of a group have both in common.
+
+    What ships keeps its own; any other name has that of its hash or the next whose marker is free, else the next pair.
+
+    Parameters
+    ----------
+    groups : iterable of str
+        ``sensors/<name>``, ``fusion/<name>`` or ``columns/<name>``; anything else is left out.
+    """
+    drawn = [group for group in groups if "/" in group]
+    places: dict[str, int] = {}
+    taken: set[tuple[str, int]] = set()
+    for group in sorted(drawn, key=lambda one: one not in NAMED):
+        kind = group.split("/", maxsplit=1)[0]
+        n_markers = len(_MARKERS[kind])
+        n_pairs, first = len(DASHES) * n_markers, _first_place(group)
+        order = [(first + step) % n_pairs for step in range(n_pairs)]
+        markers = {place % n_markers for other, place in taken if other == kind}
+        free = [place for place in order if (kind, place) not in taken] or order
+        places[group] = next((place for place in free if place % n_markers not in markers), free[0])
+        taken.add((kind, places[group]))
+    return {group: _mark(group, places[group], turn) for turn, group in enumerate(drawn)}
+
+
+def _first_place(group: str) -> int:
+    kind = group.split("/", maxsplit=1)[0]
+    if group in NAMED:
+        return [name for name in NAMED if name.startswith(f"{kind}/")].index(group)
+    return hashlib.sha256(group.encode()).digest()[2]
+
+
+def _mark(group: str, place: int, turn: int) -> Mark:
+    markers = _MARKERS[group.split("/", maxsplit=1)[0]]
+    return Mark(DASHES[place % len(DASHES)], markers[place % len(markers)], turn)
 
 
 def rgb(color: str) -> tuple[int, int, int]:

@@ -23,7 +23,7 @@ from testbed.recording.stream import Clock, Recording, Signal
 from testbed.recording.target import Target
 from testbed.recording.world import World
 from testbed.runs.attributes import unit_of
-from testbed.runs.block import PlayedBlock, clock_of
+from testbed.runs.block import POSE_STRIDE, PlayedBlock, clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -99,7 +99,7 @@ class RecordingWriter:
         unit: RateUnit,
         settle: float,
         detail: tuple[float, float] | None = None,
-        pose_stride: int = 400,
+        pose_stride: int = POSE_STRIDE,
         times_ns: Mapping[str, NDArray[np.int64]] | None = None,
         live: str | None = None,
     ) -> None:

@@ -14,6 +14,7 @@ from testbed.report.closer import closer_views
 from testbed.report.digest import N_CLOSE, Digest, digest_run
 from testbed.report.figures import errors_figure, rates_figure, spectrum_figure, thermal_figure
 from testbed.report.pointing import inside_rows, sight_budget_figure, sight_curves_figure, sight_rows
+from testbed.report.still_figures import allan_curves, errors_allan_figure, profile_figure
 from testbed.report.within_figures import adapted_figure, whiteness_figure
 from testbed.report.words import METRICS, RATIOS, claims, finding_text, further, honesty, over_bound, summary
 from testbed.runs.manifest import rewrite
@@ -167,12 +168,16 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
         drawn["errors"] = errors_figure(digest, colors, unit)
     if metrics.sources:
         drawn["spectrum"] = spectrum_figure(digest, colors, metrics.floor_density, unit)
+    if allan_curves(digest):
+        drawn["allan"] = errors_allan_figure(digest, colors, unit)
     if shows(metrics, digest.transfers):
         drawn["bode"] = bode_figure(metrics, digest.transfers, colors)
     if digest.correlations:
         drawn["whiteness"] = whiteness_figure(digest.correlations, colors)
     if digest.adapted:
         drawn["adapted"] = adapted_figure(digest.adapted, colors, digest.duration_s, unit)
+    if metrics.profiles:
+        drawn["profile"] = profile_figure(metrics.profiles, colors, unit)
     if digest.thermal:
         drawn["thermal"] = thermal_figure(digest, colors, unit)
     if metrics.budget is not None:

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
 from testbed.pages.numbers import plain
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -21,10 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
     from testbed.metrics.transfer import Transfer
+    from testbed.pages.palette import Mark
     from testbed.runs.metrics import Response, RunMetrics
 
-_SENSOR, _FILTER = "o", "s"
 _BELIEVED = (0, (1.2, 1.6))
+# Points of a response between its first and last mark, about.
+_N_POINTS = 60
 # Below this gain nothing is seen of a response.
 _LEAST = 1e-3
 
@@ -54,33 +57,34 @@ def bode_figure(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: 
         figure = Figure(figsize=(WIDTH_IN, 7.0))
         panels = figure.subplots(3, 1, sharex=True, height_ratios=[3, 3, 2])
         gain, phase, _ = panels
-        for response, color, style in _responses(metrics, colors):
-            _draw_response(gain, phase, metrics, response, (color, style))
+        marks = series_marks(colors)
+        for group, response, style in _responses(metrics):
+            _draw_response(gain, phase, metrics, response, _line_style(marks[group], colors[group], style))
         for group, transfer in transfers.items():
-            _draw_points(panels, transfer, colors[group], _marker(group))
-            _draw_lines(gain, phase, metrics, group, colors[group])
+            _draw_points(panels, transfer, colors[group], marks[group].marker)
+            _draw_lines(gain, phase, metrics, group, (colors[group], marks[group].marker))
         _frame(panels)
         arrange(figure, _handles(metrics, transfers, colors), gap_in=0.2)
     return figure
 
 
-def _marker(group: str) -> str:
-    return _SENSOR if group.startswith("sensors/") else _FILTER
-
-
-def _responses(metrics: RunMetrics, colors: Mapping[str, str]) -> Iterator[tuple[Response, str, Any]]:
+def _responses(metrics: RunMetrics) -> Iterator[tuple[str, Response, Any]]:
     if metrics.responses is not None:
         for name, response in metrics.responses.sensors.items():
-            yield response, colors[f"sensors/{name}"], "-"
+            yield f"sensors/{name}", response, "-"
         for belief in metrics.responses.beliefs:
             for name, response in belief.sensors.items():
-                yield response, colors[f"sensors/{name}"], _BELIEVED
+                yield f"sensors/{name}", response, _BELIEVED
 
 
-def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Response, look: tuple[str, Any]) -> None:
+def _line_style(mark: Mark, color: str, dash: Any) -> dict[str, Any]:
+    """Return the style of a response: dashes say whose it is, built or believed, marks of which sensor."""
+    return marked(mark, color, _N_POINTS) | {"color": color, "linestyle": dash, "linewidth": 1.3}
+
+
+def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Response, style: dict[str, Any]) -> None:
     assert metrics.responses is not None
     freq = np.array(metrics.responses.frequency_hz)[: len(response.gain)]
-    style: dict[str, Any] = {"color": look[0], "linestyle": look[1], "linewidth": 1.3}
     gain.plot(freq, response.gain, **style)
     phase.plot(freq, response.phase_deg, **style)
 
@@ -88,21 +92,21 @@ def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Respo
 def _draw_points(panels: tuple[Axes, Axes, Axes], transfer: Transfer, color: str, marker: str) -> None:
     gain, phase, coherence = panels
     told = transfer.coherence > transfer.chance
-    style: dict[str, Any] = {"color": color, "marker": marker, "linestyle": "none", "markersize": 2.6, "alpha": 0.8}
+    style: dict[str, Any] = {"color": color, "marker": marker, "linestyle": "none", "markersize": 3.4, "alpha": 0.8}
     gain.plot(transfer.freq_hz[told], np.abs(transfer.response[told]), **style)
     phase.plot(transfer.freq_hz[told], np.degrees(np.angle(transfer.response[told])), **style)
     coherence.plot(transfer.freq_hz, transfer.coherence, **style)
 
 
-def _draw_lines(gain: Axes, phase: Axes, metrics: RunMetrics, group: str, color: str) -> None:
+def _draw_lines(gain: Axes, phase: Axes, metrics: RunMetrics, group: str, look: tuple[str, str]) -> None:
     lines = [
         one for one in metrics.sources[group.split("/", 1)[1]].lines or [] if one.gain and one.phase_deg is not None
     ]
     style: dict[str, Any] = {
-        "color": color,
-        "marker": _marker(group),
+        "color": look[0],
+        "marker": look[1],
         "linestyle": "none",
-        "markersize": 6.5,
+        "markersize": 8.0,
         "fillstyle": "none",
     }
     gain.plot([one.frequency_hz for one in lines], [one.gain or 0.0 for one in lines], **style)
@@ -129,9 +133,10 @@ def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
 
 
 def _handles(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> list[Line2D | Patch]:
+    marks = series_marks(colors)
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=colors[group], linestyle="none", marker=_marker(group), markersize=5, label=label(group))
-        for group in transfers
+        Line2D([], [], color=color, label=label(group), **(marked(marks[group], color) | {"linestyle": "none"}))
+        for group, color in ((group, colors[group]) for group in transfers)
     ]
     if metrics.responses is not None:
         handles.append(Line2D([], [], color=INK, linewidth=1.3, label="as built"))

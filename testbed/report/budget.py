@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
 from testbed.pages.numbers import plain, significant
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
-from testbed.report.figures import DASHES, DEG_S, Unit
+from testbed.report.figures import DEG_S, Unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -46,15 +47,16 @@ def budget_figure(budget: Budget, colors: Mapping[str, str], unit: Unit = DEG_S)
         axes.set_xscale("log")
         axes.set_yscale("log")
         handles = []
-        for i, (name, density) in enumerate(budget.densities.items()):
-            values = np.array([np.nan if one is None else one for one in density])
+        marks = series_marks(f"sensors/{name}" for name in budget.densities)
+        for name, density in budget.densities.items():
+            values, group = np.array([np.nan if one is None else one for one in density]), f"sensors/{name}"
             handles += axes.plot(
                 budget.frequency_hz,
                 unit[1] * values,
-                color=colors[f"sensors/{name}"],
+                color=colors[group],
                 linewidth=1.9,
-                linestyle=DASHES[i % len(DASHES)],
                 label=label(name),
+                **marked(marks[group], colors[group], values.size),
             )
         if len(budget.densities) > 1:
             handles += axes.plot(

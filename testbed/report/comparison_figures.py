@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, time_axis
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
 from testbed.pages.numbers import plain
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from testbed.report.figures import Unit
     from testbed.runs.metrics import FloorDensity
 
+_FLOOR = "#8a8a8a"
 _STYLES: tuple[tuple[str, Any], ...] = (("A", "-"), ("B", (0, (4.0, 1.6))))
 
 
@@ -108,14 +110,17 @@ def spectra_beside(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 4.6))
         axes = figure.subplots()
+        marks = series_marks(f"fusion/{name}" for name in names)
         for digest, floor, (_, style) in zip(digests, floors, _STYLES, strict=True):
             for name in names:
                 trace = digest.filter_errors[name]
                 root = unit[1] * np.degrees(np.sqrt(trace.density))
-                axes.plot(trace.freq_hz, root, color=colors[f"fusion/{name}"], linewidth=1.5, linestyle=style)
+                color = colors[f"fusion/{name}"]
+                look = marked(marks[f"fusion/{name}"], color, root.size) | {"linestyle": style}
+                axes.plot(trace.freq_hz, root, color=color, linewidth=1.5, **look)
             if floor is not None:
                 density = unit[1] * np.array(floor.density)
-                axes.plot(floor.frequency_hz, density, color=INK, linewidth=1.1, linestyle=style)
+                axes.plot(floor.frequency_hz, density, color=_FLOOR, linewidth=1.1, linestyle=style)
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("frequency [Hz]")
@@ -129,10 +134,14 @@ def spectra_beside(
             axes.set_xlim(0.8 * freq.min(), 1.25 * freq.max())
         axes.grid(visible=True)
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=colors[f"fusion/{name}"], linewidth=2.2, label=label(name)) for name in names
-        ]
+            Line2D(
+                [], [], color=colors[group], linewidth=2.2, label=label(group),
+                **(marked(mark, colors[group]) | {"linestyle": "-"}),
+            )
+            for group, mark in marks.items()
+        ]  # fmt: skip
         if any(floors):
-            handles.append(Line2D([], [], color=INK, linewidth=1.1, label="noise floor"))
+            handles.append(Line2D([], [], color=_FLOOR, linewidth=1.1, label="noise floor"))
         handles += [Line2D([], [], color=INK, linewidth=1.5, linestyle=style, label=side) for side, style in _STYLES]
         arrange(figure, handles)
     return figure

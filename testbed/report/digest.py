@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.allan import AllanOctaves
 from testbed.errors import Problem, ScenarioError
 from testbed.metrics.spectra import SHORTEST_SEGMENT, WelchDensity, log_average, segment_length
 from testbed.metrics.transfer import TransferSums
@@ -15,6 +16,7 @@ from testbed.report.within import adapted, correlations
 from testbed.runs.signals import Column
 
 if TYPE_CHECKING:
+    from testbed.allan import AllanCurve
     from testbed.metrics.transfer import Transfer
     from testbed.report.within import Correlations
     from testbed.runs.metrics import RunMetrics
@@ -50,7 +52,8 @@ class ErrorTrace:
     `std` is the filter's own standard deviation [rad/s] and `inside` the share of samples after settle with |error|
     <= 2 std; None for a sensor. `transfer` is what came out over the truth. `density` is the two-sided power
     density after settle [rad^2/s^2/Hz] at `freq_hz`, empty if the record is too short; `band_rms` the error [rad/s]
-    in each band of the noise budget, None where the spectrum does not reach.
+    in each band of the noise budget, None where the spectrum does not reach. `allan` is the Allan deviation after
+    settle, None if the record is too short.
     """
 
     whole: Envelope
@@ -62,6 +65,7 @@ class ErrorTrace:
     band_rms: tuple[float | None, ...] = ()
     transfer: Transfer | None = None
     close: Envelope | None = None
+    allan: AllanCurve | None = None
 
 
 @dataclass(frozen=True)
@@ -228,6 +232,7 @@ def _follow(
     n_segment = segment_length(signal.n_time - settle)
     welch = WelchDensity(fs, n_segment) if n_segment >= SHORTEST_SEGMENT else None
     transfer = TransferSums(fs, signal.n_time - settle, [line for line in run.metrics.line_freq_hz if line > 0])
+    octaves = AllanOctaves(fs)
     trace = _rate_trace(signal, zoom)
     whole, band = Envelope(0, signal.n_time, fs, N_BINS), Envelope(0, signal.n_time, fs, N_BINS)
     close = None if std is None else Envelope(0, signal.n_time, fs, N_CLOSE)
@@ -243,16 +248,18 @@ def _follow(
         whole.process(first, error)
         if true is not None:
             transfer.process(true[settled:], rate[settled:])
+        judged = _bridged(error[settled:]) if std is None else error[settled:]
+        octaves.process(judged)
         if welch is not None:
-            welch.process(_bridged(error[settled:]) if std is None else error[settled:])
+            welch.process(judged)
         if std is not None and close is not None:
             close.process(first, error)
             sigma = std.read(first, stop)
             band.process(first, sigma)
             if truth is None:
                 continue
-            inside, judged = _count_inside(error[settled:], sigma[settled:])
-            n_inside, n_judged = n_inside + inside, n_judged + judged
+            inside, counted = _count_inside(error[settled:], sigma[settled:])
+            n_inside, n_judged = n_inside + inside, n_judged + counted
     freq_hz, density = _plotted(welch)
     return trace, ErrorTrace(
         whole=whole,
@@ -264,6 +271,7 @@ def _follow(
         band_rms=_band_rms(welch, run.metrics),
         transfer=transfer.result(),
         close=close,
+        allan=octaves.curve(),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, time_axis
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
 from testbed.pages.numbers import plain, significant
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -21,19 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from testbed.pages.envelope import Envelope
+    from testbed.pages.palette import Mark
     from testbed.report.digest import Digest, ErrorTrace
     from testbed.runs.metrics import FloorDensity
 
 MAX_LABELLED_LINES = 6
 DOTTED = (0, (1.2, 2.2))
-# Beside the color, so that lines can be told apart without it.
-DASHES: tuple[tuple[float, tuple[float, ...] | None], ...] = (
-    (0, None),
-    (0, (7, 1.5)),
-    (0, (3, 1.2)),
-    (0, (7, 1.2, 1.5, 1.2)),
-)
-
 
 # Unit of the rates, and what deg/s is multiplied by for it.
 Unit = tuple[str, float]
@@ -60,7 +54,7 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
     Figure
         Two axes, three with filters: rate against s, against hours of a long run.
     """
-    name, scale = unit[0], unit[1] * DEGREE
+    name, scale, marks = unit[0], unit[1] * DEGREE, series_marks(digest.rates)
     sensors = [group for group in digest.rates if group.startswith("sensors/")]
     filters = [group for group in digest.rates if group.startswith("fusion/")]
     # The widest first: what is narrower stands before it and hides nothing.
@@ -70,14 +64,15 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
         above, *zooms = figure.subplots(3 if filters else 2, 1, height_ratios=[2, 2.4, 2.4][: 3 if filters else 2])
         for axes, part in ((above, "whole"), (zooms[0], "zoom")):
             for group in sensors:
-                draw(axes, getattr(digest.rates[group], part), colors[group], 0.9, scale=scale)
+                draw(axes, getattr(digest.rates[group], part), colors[group], 0.9, scale=scale, mark=marks[group])
             if digest.has_truth:
                 _dash_truth(axes, getattr(digest.rates["truth"], part), colors["truth"], scale)
         if filters and digest.has_truth:
             draw(zooms[1], digest.rates["truth"].zoom, colors["truth"], 4.2, scale=scale)
         # Later lines are thinner, so that lines which lie on each other all stay visible.
         for i, group in enumerate(filters):
-            draw(zooms[1], digest.rates[group].zoom, colors[group], 2.2 * 0.7**i, scale=scale)
+            zoom = digest.rates[group].zoom
+            draw(zooms[1], zoom, colors[group], 2.2 * 0.7**i, scale=scale, mark=marks[group])
         moved = _dot_command(zooms[-1], digest, scale)
         above.axvspan(*digest.zoom_s, color=INK, alpha=0.08, linewidth=0)
         span = f"{digest.zoom_s[0]:.4g} s to {digest.zoom_s[1]:.4g} s"
@@ -93,13 +88,18 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
         for axes in zooms:
             time_axis(axes, digest.zoom_s[1] - digest.zoom_s[0], named=axes is zooms[-1])
         handles: list[Line2D | Patch] = [
-            Line2D([], [], color=colors[group], linewidth=2.2, label=label(group))
+            Line2D([], [], color=colors[group], linewidth=2.2, label=label(group), **_in_legend(marks, colors, group))
             for group in digest.rates
             if group != "commanded"
         ]
         dotted = Line2D([], [], color=INK, linewidth=1.2, linestyle=DOTTED, label="commanded")
         arrange(figure, [*handles, dotted] if moved else handles, gap_in=0.62)
     return figure
+
+
+def _in_legend(marks: Mapping[str, Mark], colors: Mapping[str, str], group: str) -> dict[str, Any]:
+    """Return how the line of a filled area is in the legend: with its mark; the truth has none."""
+    return marked(marks[group], colors[group]) | {"linestyle": "-"} if group in marks else {"linestyle": DASHED}
 
 
 def _dot_command(axes: Axes, digest: Digest, scale: float) -> bool:
@@ -242,18 +242,16 @@ def spectrum_figure(
         axes.set_xscale("log")
         axes.set_yscale("log")
         handles: list[Line2D | Patch] = []
-        for kind, width, errors in (("sensors", 0.9, digest.sensor_errors), ("fusion", 1.9, digest.filter_errors)):
-            for i, (name, trace) in enumerate(errors.items()):
-                shown = trace.density > 0
-                root = unit[1] * np.degrees(np.sqrt(trace.density[shown]))
-                handles += axes.plot(
-                    trace.freq_hz[shown],
-                    root,
-                    color=colors[f"{kind}/{name}"],
-                    linewidth=width,
-                    linestyle=DASHES[i % len(DASHES)],
-                    label=label(name),
-                )
+        traces = by_group(digest)
+        marks = series_marks(traces)
+        for group, trace in traces.items():
+            shown = trace.density > 0
+            root = unit[1] * np.degrees(np.sqrt(trace.density[shown]))
+            style = marked(marks[group], colors[group], root.size)
+            width = 0.9 if group.startswith("sensors/") else 1.9
+            handles += axes.plot(
+                trace.freq_hz[shown], root, color=colors[group], linewidth=width, label=label(group), **style
+            )
         if floor is not None:
             handles += axes.plot(
                 floor.frequency_hz,
@@ -268,6 +266,18 @@ def spectrum_figure(
     return figure
 
 
+def by_group(digest: Digest) -> dict[str, ErrorTrace]:
+    """Return the errors of sensors, then of filters, by group.
+
+    Parameters
+    ----------
+    digest : Digest
+        Traces of the run.
+    """
+    sensors = {f"sensors/{name}": trace for name, trace in digest.sensor_errors.items()}
+    return sensors | {f"fusion/{name}": trace for name, trace in digest.filter_errors.items()}
+
+
 def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.set_xlabel("frequency [Hz]")
     of = "error" if digest.has_truth else "rate"
@@ -277,11 +287,7 @@ def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     decade_axis(axes)
     axes.grid(visible=True)
-    shown = [
-        trace.freq_hz
-        for trace in [*digest.sensor_errors.values(), *digest.filter_errors.values()]
-        if trace.freq_hz.size
-    ]
+    shown = [trace.freq_hz for trace in by_group(digest).values() if trace.freq_hz.size]
     if shown:
         axes.set_xlim(0.8 * min(freq[0] for freq in shown), 1.25 * max(freq[-1] for freq in shown))
     low, high = axes.get_xlim()
@@ -319,16 +325,17 @@ def thermal_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S
         figure = Figure(figsize=(WIDTH_IN, 5.0))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 3])
         handles: list[Line2D | Patch] = []
-        for i, (name, trace) in enumerate(digest.thermal.items()):
-            color, dashes = colors[f"sensors/{name}"], DASHES[i % len(DASHES)]
+        marks = series_marks(f"sensors/{name}" for name in digest.thermal)
+        for name, trace in digest.thermal.items():
+            color, mark = colors[f"sensors/{name}"], marks[f"sensors/{name}"]
             inside = (trace.temperature.low + trace.temperature.high) / 2 - 273.15
-            above.plot(trace.temperature.time, inside, color=color, linewidth=1.4)
-            draw(below, errors[name], color, 0.6, alpha=0.45, scale=scale)
+            style = marked(mark, color, inside.size)
+            words = f"{label(name)}: thermometer, error"
+            handles += above.plot(trace.temperature.time, inside, color=color, linewidth=1.4, label=words, **style)
+            draw(below, errors[name], color, 0.6, alpha=0.45, scale=scale, mark=mark)
             drift = scale * (trace.drift.low + trace.drift.high) / 2
-            handles.append(Patch(facecolor=color, label=f"{label(name)}: thermometer, error"))
-            handles += below.plot(
-                trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=dashes, label="true thermal drift"
-            )
+            words = f"{label(name)}: true thermal drift"
+            handles += below.plot(trace.drift.time, drift, color=INK, linewidth=1.4, linestyle=mark.dash, label=words)
         above.set_ylabel("temperature [°C]")
         below.set_ylabel(f"error [{unit[0]}]")
         below.set_xlim(0, digest.duration_s)

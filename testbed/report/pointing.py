@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
 from testbed.pages.numbers import plain, significant
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.runs.table import window_text
 
@@ -23,13 +24,13 @@ if TYPE_CHECKING:
 
     from testbed.runs.metrics import PointingMetrics, RunMetrics
 
-# Of the parts of a budget, by name; any part inside the knowledge is a shade of its own.
+# Of the parts of a budget, by name: colour, and the hatch that is left of it in grey.
 _PARTS = {
-    "mirror": "#5b8aa6",
-    "latency": "#d98a2b",
-    "knowledge": "#2f9e58",
-    "tracker_noise": "#7377e8",
-    "saturation": "#b3261e",
+    "mirror": ("#5b8aa6", ""),
+    "latency": ("#d98a2b", "////"),
+    "knowledge": ("#2f9e58", "...."),
+    "tracker_noise": ("#7377e8", "\\\\\\\\"),
+    "saturation": ("#b3261e", "xxxx"),
 }
 _DOTTED = (0, (1.2, 1.6))
 
@@ -95,11 +96,19 @@ def sight_budget_figure(sights: Mapping[str, PointingMetrics]) -> Figure:
             for part in parts:
                 share = 100.0 * budget.shares.get(part, 0.0)
                 side = 1.0 if share >= 0.0 else -1.0
-                axes.barh(place, share, left=ends[side], height=0.56, color=_PARTS[part], edgecolor="none")
+                axes.barh(place, share, left=ends[side], height=0.56, **_area(part))
                 if abs(share) >= 7.0:
                     middle = ends[side] + 0.5 * share
                     text = f"{share:.0f} %".replace("-", "−")
-                    axes.annotate(text, (middle, place), ha="center", va="center", fontsize=8.5, color="#ffffff")
+                    axes.annotate(
+                        text,
+                        (middle, place),
+                        ha="center",
+                        va="center",
+                        fontsize=8.5,
+                        color="#ffffff",
+                        bbox=_behind(part),
+                    )
                 ends[side] += share
             words = f"{significant(budget.total_urad)} µrad"
             axes.annotate(words, (ends[1.0], place), xytext=(6, 0), textcoords="offset points", ha="left", va="center")
@@ -110,9 +119,19 @@ def sight_budget_figure(sights: Mapping[str, PointingMetrics]) -> Figure:
         axes.margins(x=0.12)
         axes.set_xlabel("share of the residual's variance [%]; all of a bar add up to 100")
         axes.grid(visible=True, axis="x")
-        arrange(figure, [Patch(facecolor=_PARTS[part], label=part.replace("_", " ")) for part in parts])
+        arrange(figure, [Patch(label=part.replace("_", " "), **_area(part)) for part in parts])
         figure.subplots_adjust(left=1.35 / WIDTH_IN)
     return figure
+
+
+def _area(part: str) -> dict[str, Any]:
+    color, hatch = _PARTS[part]
+    return {"facecolor": color, "edgecolor": "#ffffff", "linewidth": 0.0, "hatch": hatch}
+
+
+def _behind(part: str) -> dict[str, Any]:
+    """Return the box behind a number, so that no hatch crosses it."""
+    return {"facecolor": _PARTS[part][0], "edgecolor": "none", "pad": 1.5}
 
 
 def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[str, str]) -> Figure:
@@ -138,12 +157,15 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
             axes.set_yscale("log")
         handles = [Line2D([], [], color=INK, linewidth=1.3, linestyle=(0, (5, 2)), label="tracker alone")]
         first = next(iter(sights.values()))
-        _curves(above, below, first, "tracker_only", INK, 1.3, (0, (5, 2)))
+        _curves(above, below, first, "tracker_only", {"color": INK, "linewidth": 1.3, "linestyle": (0, (5, 2))})
+        marks = series_marks(f"fusion/{name}" for name in sights)
         for name, sight in sights.items():
-            color = colors[f"fusion/{name}"]
-            _curves(above, below, sight, "residual", color, 2.0, "-")
-            _curves(above, below, sight, "knowledge", color, 1.3, _DOTTED)
-            handles.append(Line2D([], [], color=color, linewidth=2.2, label=label(name)))
+            color, mark = colors[f"fusion/{name}"], marks[f"fusion/{name}"]
+            look = {"color": color, **marked(mark, color, len(sight.curves.get("frequency_hz", [])))}
+            _curves(above, below, sight, "residual", {**look, "linewidth": 2.0, "linestyle": "-"})
+            _curves(above, below, sight, "knowledge", {**look, "linewidth": 1.3, "linestyle": _DOTTED})
+            style = marked(mark, color) | {"linestyle": "-"}
+            handles.append(Line2D([], [], color=color, linewidth=2.2, label=label(name), **style))
         handles.append(Line2D([], [], color=INK, linewidth=1.3, linestyle=_DOTTED, label="knowledge"))
         above.set_ylabel("density, two-sided [µrad/√Hz]")
         below.set_ylabel("rms below the frequency [µrad]")
@@ -159,7 +181,7 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
     return figure
 
 
-def _curves(above: Axes, below: Axes, sight: PointingMetrics, signal: str, color: str, width: float, dash: Any) -> None:
+def _curves(above: Axes, below: Axes, sight: PointingMetrics, signal: str, style: dict[str, Any]) -> None:
     curves = sight.curves
     freq = np.array(curves.get("frequency_hz", []), dtype=float)
     if not freq.size:
@@ -167,7 +189,7 @@ def _curves(above: Axes, below: Axes, sight: PointingMetrics, signal: str, color
     density = np.sqrt(np.array(curves[f"{signal}_urad2_hz"], dtype=float))
     sums = np.array(curves[f"{signal}_below_urad"], dtype=float)
     for axes, values in ((above, density), (below, sums)):
-        axes.plot(freq, np.where(values > 0.0, values, np.nan), color=color, linewidth=width, linestyle=dash)
+        axes.plot(freq, np.where(values > 0.0, values, np.nan), **style)
 
 
 def _last_decades(axes: Axes, decades: float) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, time_axis
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
+from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
-from testbed.report.figures import DASHES, DEG_S, Unit
+from testbed.report.figures import DEG_S, Unit
+from testbed.report.within import LAGS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -21,10 +23,8 @@ if TYPE_CHECKING:
 
     from testbed.pages.envelope import Envelope
     from testbed.report.within import Correlations
-    from testbed.signals import FloatArray
 
 _NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of"}
-_MARKERS = ("o", "s", "^", "D", "v")
 # More decades than this above the lowest hide what the filter does most of the time.
 _DECADES = 6.0
 
@@ -46,6 +46,7 @@ def adapted_figure(
         Unit of the rates, and what deg/s is multiplied by for it.
     """
     filters = list(dict.fromkeys(name for by_filter in traces.values() for name in by_filter))
+    marks = series_marks(f"fusion/{name}" for name in filters)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * len(traces)))
         panels = figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0]
@@ -54,7 +55,8 @@ def adapted_figure(
             for i, name in enumerate(filters):
                 if name in by_filter:
                     scale = 1.0 if counted else (unit[1] * DEGREE) ** 2
-                    draw(axes, by_filter[name], colors[f"fusion/{name}"], 1.6 * 0.8**i, scale=scale)
+                    group = f"fusion/{name}"
+                    draw(axes, by_filter[name], colors[group], 1.6 * 0.8**i, scale=scale, mark=marks[group])
             axes.set_title(_title(key), loc="left")
             axes.set_ylabel("readings" if counted else f"({unit[0]})²")
             axes.grid(visible=True)
@@ -85,7 +87,14 @@ def _logarithmic(axes: Axes, envelopes: Iterable[Envelope], scale: float) -> Non
 
 
 def _handles(filters: Iterable[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
-    return [Line2D([], [], color=colors[f"fusion/{name}"], linewidth=2.2, label=label(name)) for name in filters]
+    marks = series_marks(f"fusion/{name}" for name in filters)
+    return [
+        Line2D(
+            [], [], color=colors[group], linewidth=2.2, label=label(group),
+            **(marked(mark, colors[group]) | {"linestyle": "-"}),
+        )
+        for group, mark in marks.items()
+    ]  # fmt: skip
 
 
 def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Mapping[str, str]) -> Figure:
@@ -99,6 +108,7 @@ def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Ma
         Group (``fusion/kalman``, ...) to color.
     """
     filters = list(dict.fromkeys(name for by_filter in found.values() for name in by_filter))
+    marks = series_marks(f"fusion/{name}" for name in filters)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.9 * len(found)))
         panels = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
@@ -107,7 +117,8 @@ def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Ma
             axes.axhspan(-bound, bound, color=INK, alpha=0.13, linewidth=0)
             axes.axhline(0.0, color=INK, linewidth=0.6)
             for name, one in by_filter.items():
-                _draw_correlations(axes, one.values, colors[f"fusion/{name}"], filters.index(name))
+                lags, color = np.arange(1, len(one.values) + 1), colors[f"fusion/{name}"]
+                axes.plot(lags, one.values, color=color, linewidth=1.1, **marked(marks[f"fusion/{name}"], color, LAGS))
             axes.set_title(f"innovations of {label(sensor)}", loc="left")
             axes.set_ylabel("correlation")
             axes.grid(visible=True)
@@ -116,18 +127,11 @@ def whiteness_figure(found: Mapping[str, Mapping[str, Correlations]], colors: Ma
     return figure
 
 
-def _draw_correlations(axes: Axes, values: FloatArray, color: str, turn: int) -> None:
-    axes.plot(np.arange(1, len(values) + 1), values, color=color, linewidth=1.1, markersize=3.2, **_look(turn))
-
-
-def _look(turn: int) -> dict[str, Any]:
-    return {"linestyle": DASHES[turn % len(DASHES)], "marker": _MARKERS[turn % len(_MARKERS)]}
-
-
 def _style_handles(filters: Sequence[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
+    marks = series_marks(f"fusion/{name}" for name in filters)
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=colors[f"fusion/{name}"], linewidth=1.4, markersize=3.5, label=label(name), **_look(i))
-        for i, name in enumerate(filters)
+        Line2D([], [], color=colors[group], linewidth=1.4, label=label(group), **marked(mark, colors[group]))
+        for group, mark in marks.items()
     ]
     handles.append(Line2D([], [], color=INK, alpha=0.3, linewidth=6.0, label="95 % of chance, if white"))
     return handles

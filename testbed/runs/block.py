@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from testbed.pointing.line_of_sight import PointingBlock
     from testbed.signals import FloatArray
 
+# Base samples between poses of the bodies and between profiles of a fluid.
+POSE_STRIDE = 400
 # Of a line of sight, what a run keeps.
 POINTING_SIGNALS = ("residual", "knowledge", "tracker_only", "mirror")
 

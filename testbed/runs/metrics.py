@@ -222,6 +222,17 @@ class PointingMetrics(Entry):
     link: dict[str, float | None] | None = None
 
 
+class ProfileMetrics(Entry):
+    """The fluid of a channel at some instants [s]: rate of the wall, and of the fluid relative to it at every height
+    [m], per radius [deg/s].
+    """
+
+    height_m: list[float]
+    time_s: list[float]
+    wall_deg_s: list[float]
+    slip_deg_s: list[list[float]]
+
+
 class Expectation(Entry):
     """A bound of the scenario on a sensor or filter, the value that was reached and whether it was met."""
 
@@ -335,6 +346,7 @@ class RunMetrics(Entry):
     budget: Budget | None = None
     responses: Responses | None = None
     pointing: dict[str, PointingMetrics] = {}
+    profiles: dict[str, ProfileMetrics] = {}
     expectations: list[Expectation] = []
     replay: ReplayMetrics | None = None
     findings: list[FindingMetrics] = []

@@ -17,10 +17,14 @@ from testbed.campaigns.regression.history import NUMBERS, append, latest, read_h
 from testbed.campaigns.regression.leaderboard import standings
 from testbed.campaigns.regression.regress import run_regression
 from testbed.campaigns.regression.standard import AXES, SHORT, STANDARD, Contenders, Setting, published, standard_study
+from testbed.campaigns.renewal import code_sha256
 from testbed.campaigns.statistics import holm
+from testbed.campaigns.study import load_study
+from testbed.campaigns.sweep import sweep
 from testbed.cli.app import app
 from testbed.errors import ScenarioError
 from testbed.fusion import FILTERS
+from tests.campaigns.test_study import written
 from tests.examples.programs import EXAMPLES
 
 SEEDS = range(10)
@@ -99,6 +103,20 @@ def test_what_is_new_or_gone_is_named_and_does_not_fail():
     assert incomparable(now, []) == ["everything has no baseline yet"]
 
 
+def test_what_is_left_of_a_line_of_sight_is_held_too():
+    """Beyond 0.5 dB; a baseline without one is named, a line of sight that is gone has moved."""
+    aimed = {"residual_rms_urad": 0.5, "rpe_urad.0.1": 0.3}
+    assert moves(made(**aimed), made(**aimed)) == []
+    (one,) = moves(made(**{**aimed, "residual_rms_urad": 0.54}), made(**aimed))
+    assert (one.quantity, one.change) == ("residual", pytest.approx(20.0 * np.log10(1.08)))
+    (one,) = moves(made(**{**aimed, "rpe_urad.0.1": 0.27}), made(**aimed))
+    assert one.quantity == "RPE"
+    assert moves(made(**aimed), made()) == []
+    assert incomparable(made(**aimed), made()) == ["line of sight, mixed: has no baseline yet"]
+    (one,) = moves(made(), made(**aimed))
+    assert one.quantity == "definition"
+
+
 def test_holm_is_the_step_down_of_its_paper():
     """Worked by hand: 0.01 x 4, max(0.04, 0.02 x 3), max(0.06, 0.03 x 2), 0.5 x 1."""
     assert holm([0.03, 0.01, 0.5, 0.02]) == pytest.approx([0.06, 0.04, 0.5, 0.06])
@@ -129,6 +147,10 @@ def test_filters_stand_in_the_order_of_their_errors_over_the_least():
     assert (bad.honest, bad.worst_case) == (0.5, "4 Hz")
     assert bad.error_over_claim == pytest.approx(1.0)
     assert [one.name for one in standings([*rows, *made("lazy", 0.001, 0.0)], {})] == ["good", "bad", "lazy"]
+    assert np.isnan(good.residual)
+    aimed = [*made("good", residual_rms_urad=2.0), *made("good", case=("4 Hz", "rest"), residual_rms_urad=8.0)]
+    (found,) = standings(aimed, {})
+    assert found.residual == pytest.approx(4.0)
 
 
 def test_the_standard_campaign_has_what_it_says():
@@ -163,6 +185,7 @@ def test_a_published_filter_enters_by_one_file_and_one_command(tiny, tmp_path):
     assert list(mine.moves) == []
     assert mine.incomparable == ["Blend has no baseline yet"]
     assert all(one.cost is not None for one in mine.standings)
+    assert all(one.residual > 0.0 for one in mine.standings)
     page = (mine.folder / "leaderboard.html").read_text("utf-8")
     assert "--filter=own_filter:Blend" in page
     assert 'data-name="Blend"' in page
@@ -171,7 +194,7 @@ def test_a_published_filter_enters_by_one_file_and_one_command(tiny, tmp_path):
         run_regression(entry, short=True, update="Mine.", out=tmp_path / "mine", history=history)
 
 
-def test_a_campaign_that_came_to_its_end_is_played_anew_and_one_that_did_not_goes_on(tiny, tmp_path, monkeypatch):
+def test_a_campaign_goes_on_with_the_code_that_began_it_and_is_played_anew_by_any_other(tiny, tmp_path, monkeypatch):
     played = []
 
     def recorded(task):
@@ -188,8 +211,34 @@ def test_a_campaign_that_came_to_its_end_is_played_anew_and_one_that_did_not_goe
         run_regression(**options, progress=stop)
     run_regression(**options)
     assert played == [0, 1]
-    run_regression(**options)
+    # Looked at, and then stored: nothing is repeated.
+    run_regression(**options, update="First.")
+    assert played == [0, 1]
+    monkeypatch.setattr("testbed.campaigns.regression.regress.code_sha256", lambda _plugins: "another")
+    assert list(run_regression(**options).moves) == []
     assert played == [0, 1, 0, 1]
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    monkeypatch.setattr("testbed.campaigns.regression.regress.code_sha256", lambda _plugins: "a third")
+    with pytest.raises(ScenarioError, match=r"notes\.txt: move that away"):
+        run_regression(**options)
+
+
+def test_the_code_of_a_campaign_is_the_package_and_the_plugin(tmp_path):
+    plugin = tmp_path / "mine.py"
+    plugin.write_text("a = 1")
+    first = code_sha256([str(plugin)])
+    assert first == code_sha256([str(plugin)])
+    plugin.write_text("a = 2")
+    assert first != code_sha256([str(plugin)]) != code_sha256([])
+
+
+def test_a_sweep_of_somebody_is_refused_and_stays(tiny, tmp_path):
+    """It came to its end and has as many rows."""
+    folder = sweep(load_study(written(tmp_path, "seeds: 9\n")), out=tmp_path / "mine")
+    before = testbed.open_sweep(folder)
+    with pytest.raises(ScenarioError, match="holds another study: name was"):
+        run_regression(short=True, out=folder, history=tmp_path / "h.parquet")
+    assert testbed.open_sweep(folder).equals(before)
 
 
 def test_the_command_says_what_moved_by_its_status(tiny, tmp_path, monkeypatch):

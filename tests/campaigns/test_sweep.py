@@ -235,6 +235,28 @@ def test_error_against_the_delay_of_a_sensor(tmp_path):
         assert f"testbed sweep {path} --only {case}:7" in page
 
 
+def test_the_line_of_sight_over_the_latency_of_its_mirror(tmp_path):
+    """Any key of `pointing` is an axis: what a line leaves grows with the latency, and the rows are those of a run."""
+    axes = "{pointing.mirror.latency: [0 ms, 0.5 ms, 1 ms], pointing.tracker.bandwidth: [10 Hz]}"
+    path = written(tmp_path, f"vary: {axes}\nseeds: 1\n")
+    with (tmp_path / "base.yaml").open("a") as base:
+        base.write("pointing: {windows: [10 ms], mirror: {bandwidth: 1 kHz}}\n")
+    study = load_study(path)
+    folder = sweep(study, out=tmp_path / "out")
+    rows = [row for row in open_sweep(folder).to_pylist() if row["source"] == "kalman"]
+    assert [row["pointing.mirror.latency"] for row in rows] == [0.0, 5e-4, 1e-3]
+    assert {row["pointing.tracker.bandwidth"] for row in rows} == {10.0}
+    left = [row["residual_rms_urad"] for row in rows]
+    assert left == sorted(left)
+    found = testbed.run(study.cases[2].scenario, seed=7).metrics.pointing["kalman"]
+    for name in ("rpe_urad", "mpe_urad"):
+        np.testing.assert_allclose(rows[2][f"{name}.0.01"], found[name]["0.01"], rtol=1e-9)
+    assert all(row["residual_rms_urad"] is None for row in open_sweep(folder).to_pylist() if row["kind"] == "sensor")
+    page = (folder / "sweep.html").read_text("utf-8")
+    assert 'aria-label="Line of sight over the first axis"' in page
+    assert page.count("RPE over 10 ms") == 1
+
+
 def test_what_a_task_gives_can_be_sent(tmp_path):
     study = load_study(written(tmp_path, "seeds: 1\n"))
     task = Agenda(study, ()).next()

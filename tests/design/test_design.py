@@ -141,8 +141,16 @@ def test_the_command_writes_the_chosen_scenario_and_proves_it(file, tmp_path):
     assert spoken.exit_code == 0, spoken.output
     said = json.loads(spoken.stdout)
     assert said["chosen"]["mirror"] == "led"
-    for row in said["proof"].values():
-        assert_allclose(row["mean"], row["by_spectra"], rtol=0.05)
+    rows = testbed.open_sweep(tmp_path / "out" / "proof").to_pandas().query("kind == 'filter'")
+    assert list(rows.seed) == [3, 4]
+    for metric, row in said["proof"].items():
+        assert_allclose(row["value"], row["by_spectra"], rtol=0.05)
+        assert_allclose(row["value"], np.sqrt(np.mean(rows[metric] ** 2)), rtol=1e-12)
+        assert row["lower"] < row["value"] < row["upper"]
+        assert (row["asked"], row["proven"], row["n_seed"]) == ("< 0.5", True, 2)
+    page = (tmp_path / "out" / "proof" / "sweep.html").read_text("utf-8")
+    assert "Asked: RPE over 100 ms &lt; 0.5 urad" in page
+    assert 'id="sights"' in page
     again = testbed.load_scenario(tmp_path / "out" / "chosen.yaml")
     assert again.pointing.mirror.lead
     assert (tmp_path / "out" / "pareto.svg").exists()

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     Row = Mapping[str, Any]
     Key = tuple[str, ...]
 
+# Errors that are compared, by their columns; those of a line of sight only where there is one.
+ERRORS = {"error": "rmse_deg_s", "residual": "residual_rms_urad", "RPE": "rpe_urad.0.1"}
 # Beyond this a change fails whatever its interval, in error and gain [dB]; a phase turns by as much relatively [deg].
 LIMIT_DB = 0.5
 LIMIT_DEG = float(np.rad2deg(10.0 ** (LIMIT_DB / 20.0) - 1.0))
@@ -36,8 +38,9 @@ class Move:
         In words.
     source : str
         Sensor or filter.
-    quantity : {"error", "gain", "phase", "definition"}
-        What moved; `definition`: it is defined in one of the two only.
+    quantity : {"error", "residual", "RPE", "gain", "phase", "definition"}
+        What moved, `residual` and `RPE` (over 100 ms) of the line of sight; `definition`: an error is defined in one of
+        the two only.
     change, lower, upper : float
         By how much, with its 95 % interval over paired seeds [dB; deg for a phase]; NaN where undefined.
     p_value : float
@@ -92,7 +95,7 @@ def moves(now: Iterable[Row], before: Iterable[Row]) -> list[Move]:
         seeds = sorted(new[key].keys() & old[key].keys())
         pair = [[side[key][seed] for seed in seeds] for side in (new, old)]
         found += _moves_of(key, *pair)
-    errors = [one for one in found if one.quantity == "error"]
+    errors = [one for one in found if one.quantity in ERRORS]
     corrected = dict(zip(map(id, errors), holm([one.p_value for one in errors]), strict=True))
     judged = [_with(one, corrected.get(id(one), 1.0)) for one in found]
     return [one for one in judged if _fails(one)]
@@ -107,7 +110,17 @@ def incomparable(now: Iterable[Row], before: Iterable[Row]) -> list[str]:
         As for `moves`.
     """
     new, old = _grouped(now), _grouped(before)
-    return [*_only(new, old, "has no baseline yet"), *_only(old, new, "is gone")]
+    return [*_only(new, old, "has no baseline yet"), *_sights(new, old), *_only(old, new, "is gone")]
+
+
+def _sights(new: Mapping[Key, Any], old: Mapping[Key, Any]) -> list[str]:
+    """Return the cases whose line of sight is new."""
+
+    def aimed(rows: Mapping[int, Row]) -> bool:
+        return bool(np.isfinite(_column(rows.values(), ERRORS["residual"])).any())
+
+    cases = {key[1:] for key, rows in new.items() if key in old and aimed(rows) and not aimed(old[key])}
+    return [f"line of sight, {in_words(case)}: has no baseline yet" for case in sorted(cases)]
 
 
 def _only(here: Mapping[Key, Any], there: Mapping[Key, Any], words: str) -> list[str]:
@@ -129,14 +142,16 @@ def _grouped(rows: Iterable[Row]) -> dict[Key, dict[int, Row]]:
 
 def _moves_of(key: Key, now: list[Row], before: list[Row]) -> list[Move]:
     source, case = key[0], in_words(key[1:])
-    errors = [_column(rows, "rmse_deg_s") for rows in (now, before)]
-    if not np.array_equal(np.isfinite(errors[0]), np.isfinite(errors[1])):
+    errors = {name: [_column(rows, column) for rows in (now, before)] for name, column in ERRORS.items()}
+    # A line of sight that is not in the baseline is no move, and none in both no comparison.
+    held = {name: pair for name, pair in errors.items() if name == "error" or np.isfinite(pair[1]).any()}
+    if any(not np.array_equal(np.isfinite(new), np.isfinite(old)) for new, old in held.values()):
         return [Move(case, source, "definition", np.nan, np.nan, np.nan, 1.0)]
     gains = [_column(rows, "gain") for rows in (now, before)]
     turn = _column(now, "phase_deg") - _column(before, "phase_deg")
     with np.errstate(divide="ignore", invalid="ignore"):
         return [
-            _move(case, source, "error", _DB * np.log(errors[0] / errors[1])),
+            *(_move(case, source, name, _DB * np.log(new / old)) for name, (new, old) in held.items()),
             _move(case, source, "gain", _DB * np.log(gains[0] / gains[1])),
             _move(case, source, "phase", (turn + 180.0) % 360.0 - 180.0),
         ]
@@ -167,8 +182,8 @@ def _fails(one: Move) -> bool:
         return True
     if abs(one.change) > (LIMIT_DEG if one.quantity == "phase" else LIMIT_DB):
         return True
-    return one.quantity == "error" and abs(one.change) > ROUNDING_DB and one.p_value < CHANCE
+    return one.quantity in ERRORS and abs(one.change) > ROUNDING_DB and one.p_value < CHANCE
 
 
 def _column(rows: Iterable[Row], name: str) -> FloatArray:
-    return np.array([np.nan if row[name] is None else row[name] for row in rows], dtype=float)
+    return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=float)

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 HISTORY = Path(str(resources.files("testbed.campaigns.regression") / "history.parquet"))
 # Of each row of a campaign, what is stored; gain and phase are of the first line.
-NUMBERS = ("rmse_deg_s", "mean_std_deg_s", "nees", "optimum_rmse_deg_s", "floor_rmse_deg_s", "gain", "phase_deg")
+NUMBERS = (
+    *("rmse_deg_s", "mean_std_deg_s", "nees", "optimum_rmse_deg_s", "floor_rmse_deg_s", "gain", "phase_deg"),
+    *("residual_rms_urad", "rpe_urad.0.1"),
+)
 _TEXTS = ("campaign", "version", "reason", "kind", "source", *AXES)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.campaigns.regression.compare import in_words
+from testbed.campaigns.regression.compare import ERRORS, in_words
 from testbed.campaigns.regression.standard import AXES
 from testbed.campaigns.statistics import COVERAGE
 
@@ -46,6 +46,8 @@ class Standing:
         Its time over that of `kalman` [-].
     n_case : int
         Cases in which its error is defined.
+    residual : float
+        What it leaves of a line of sight, geometric mean over the cases with one [urad]; NaN without.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Standing:
     error_over_claim: float
     cost: float | None
     n_case: int
+    residual: float
 
 
 def standings(rows: Iterable[Row], costs: Mapping[str, float]) -> list[Standing]:
@@ -95,7 +98,7 @@ def _standing(name: str, cases: Mapping[tuple[str, ...], Sequence[Row]], cost: f
         claims.append(float(np.sqrt(np.mean(errors**2) / np.mean(_column(rows, "mean_std_deg_s") ** 2))))
         honest.append(float(np.mean(_column(rows, "nees"))) <= HONEST_NEES)
     if not ratios:
-        return Standing(name, np.nan, np.nan, np.nan, np.nan, "", 0.0, np.nan, cost, 0)
+        return Standing(name, np.nan, np.nan, np.nan, np.nan, "", 0.0, np.nan, cost, 0, np.nan)
     worst = max(ratios, key=lambda case: ratios[case])
     seeds = min(column.size for column in logs)
     # Cases of one seed are not independent, seeds are.
@@ -106,7 +109,17 @@ def _standing(name: str, cases: Mapping[tuple[str, ...], Sequence[Row]], cost: f
     over, lower, upper = (float(np.exp(x)) for x in (centre, centre - half, centre + half))
     mean_claim = float(np.exp(np.mean(np.log(claims))))
     share = float(np.mean(honest))
-    return Standing(name, over, lower, upper, ratios[worst], in_words(worst), share, mean_claim, cost, len(ratios))
+    place = in_words(worst)
+    return Standing(
+        name, over, lower, upper, ratios[worst], place, share, mean_claim, cost, len(ratios), _residual(cases.values())
+    )
+
+
+def _residual(cases: Iterable[Sequence[Row]]) -> float:
+    """Return the rms of the residual over the seeds, geometric mean over the cases that have one [urad]."""
+    residuals = [_column(rows, ERRORS["residual"]) for rows in cases]
+    logs = [0.5 * np.log(np.mean(one**2)) for one in residuals if np.isfinite(one).all()]
+    return float(np.exp(np.mean(logs))) if logs else float("nan")
 
 
 def _least(rows: Sequence[Row]) -> FloatArray:
@@ -115,7 +128,7 @@ def _least(rows: Sequence[Row]) -> FloatArray:
 
 
 def _column(rows: Iterable[Row], name: str) -> FloatArray:
-    return np.array([np.nan if row[name] is None else row[name] for row in rows], dtype=float)
+    return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=float)
 
 
 def costs_of(scenario: Scenario) -> dict[str, float]:

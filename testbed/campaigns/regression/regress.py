@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +12,15 @@ from testbed.campaigns.regression.history import HISTORY, append, essence, lates
 from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
 from testbed.campaigns.regression.page import write_leaderboard
 from testbed.campaigns.regression.standard import SHORT, STANDARD, Contenders, shipped, standard_study
+from testbed.campaigns.renewal import code_sha256, make_way
 from testbed.campaigns.rows import OK
-from testbed.campaigns.store import STUDY, read_cases
+from testbed.campaigns.store import read_cases
 from testbed.campaigns.sweep import sweep
 from testbed.errors import Problem, ScenarioError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from testbed.campaigns.study import Study
     from testbed.campaigns.sweep import Progress
 
 
@@ -53,7 +52,7 @@ def run_regression(
 ) -> Outcome:
     """Play the standard campaign, compare it with its baseline and write ``leaderboard.html`` beside ``sweep.html``.
 
-    A folder of a campaign that came to its end is played anew, one that did not is gone on with.
+    What the same code has played already is not repeated, so that a result may be looked at before it is stored.
 
     Parameters
     ----------
@@ -82,9 +81,10 @@ def run_regression(
             [Problem("expected no --filter: the baseline is that of the filters that ship", "--update")]
         )
     begun = _spent()
-    study = standard_study(entry or shipped(), short=short)
+    plugins = entry.plugins if entry else ()
+    study = replace(standard_study(entry or shipped(), short=short), code=code_sha256(plugins))
     target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
-    _begin(target, study)
+    make_way(target, study, plugins)
     folder = sweep(study, workers=workers, out=target, progress=progress)
     table = read_cases(folder).to_pylist()
     rows, failures = essence(table), [row for row in table if row["status"] != OK]
@@ -109,13 +109,3 @@ def _spent() -> float:
     """Return the processor time of this process and of those that it started and that ended [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
-
-
-def _begin(folder: Path, study: Study) -> None:
-    """Remove a campaign that came to its end: the code may be another since."""
-    if not (folder / STUDY).is_file():
-        return
-    rows = read_cases(folder, ["case", "seed"])
-    done = set(zip(rows["case"].to_pylist(), rows["seed"].to_pylist(), strict=True))
-    if len(done) >= len(study.cases) * len(study.seeds):
-        shutil.rmtree(folder)

@@ -37,13 +37,22 @@ _MIXED: list[dict[str, Any]] = [
     {"sine": {"frequency": "10 Hz", "angle": "50 urad"}},
 ]
 _LINES = ("0.1 Hz", "0.5 Hz", "2 Hz", "4 Hz", "10 Hz", "25 Hz", "100 Hz", "500 Hz")
+# A line of sight that the estimate holds, where the motion is one that shakes it; the beacon fades once.
+_SIGHT = {
+    "tracker": {"bandwidth": "10 Hz"},
+    "mirror": {"bandwidth": "1 kHz", "latency": "500 us", "lead": True},
+    "windows": ["100 ms"],
+}
+_FADED = {**_SIGHT, "tracker": {"bandwidth": "10 Hz", "fades": [{"at": "4 s", "length": "1 s"}]}}
+_PLATFORM = {"spectrum": "olympus", "low": "1 Hz", "high": "150 Hz"}
 _SIGNALS: dict[str, dict[str, Any]] = {
     **{freq: {"motion": _line(freq)} for freq in _LINES},
     # A period at the least.
     "0.1 Hz": {"motion": _line("0.1 Hz"), "duration": "15 s", "settle": "5 s"},
     "mixed": {"motion": _MIXED},
-    "jitter": {"motion": _jitter()},
-    "platform": {"motion": [{"platform_psd": {"spectrum": "olympus", "low": "1 Hz", "high": "150 Hz"}}]},
+    "100 Hz": {"motion": _line("100 Hz"), "pointing": _SIGHT},
+    "jitter": {"motion": _jitter(), "pointing": _SIGHT},
+    "platform": {"motion": [{"platform_psd": _PLATFORM}], "pointing": _FADED},
     "chirp": {
         "motion": [{"chirp": {"start_frequency": "0.5 Hz", "stop_frequency": "25 Hz", "rate": "1 deg/s"}}],
     },

@@ -81,11 +81,12 @@ def _print(found: Outcome) -> None:
     from testbed.cli.console import ruled, terminal
 
     console = terminal()
-    table = ruled("filter", "error over optimum", "95 %", "worst", "where", "claims hold", "time over kalman's")
+    table = ruled("filter", "error over optimum", "95 %", "worst", "where", "claims hold", "time over kalman's", "urad")
     for one in found.standings:
         cost = "-" if one.cost is None else f"{one.cost:.2g}"
         limits, claims = f"{one.lower:.3g} to {one.upper:.3g}", f"{100 * one.honest:.0f} %"
-        table.add_row(one.name, f"{one.over_optimum:.3g}", limits, f"{one.worst:.3g}", one.worst_case, claims, cost)
+        error, worst, sight = (f"{value:.3g}" for value in (one.over_optimum, one.worst, one.residual))
+        table.add_row(one.name, error, limits, worst, one.worst_case, claims, cost, sight)
     console.print(table)
     lines = [
         *(f"failed: case {row['case']}, seed {row['seed']}: {row['reason']}" for row in found.failures),

@@ -38,7 +38,6 @@ def run(
     from testbed.cli.check_page import size_words, warnings
     from testbed.cli.terminal import print_metrics
     from testbed.logs.options import quantity
-    from testbed.recording.viewer import live_window
     from testbed.runs.outputs import chosen
     from testbed.scenario.loader import load_scenario
 
@@ -52,7 +51,11 @@ def run(
     output.note(f"{loaded.name}: {size_words(forecast(loaded, wanted))}")
     target = out or Path("runs") / loaded.name
     with ExitStack() as stack:
-        address, window = stack.enter_context(live_window()) if live else (None, None)
+        address, window = None, None
+        if live:
+            from testbed.recording.viewer import live_window
+
+            address, window = stack.enter_context(live_window())
         with output.progress(loaded.name, loaded.frame.duration) as tick:
             result = run_scenario(
                 loaded, out=target, seed=seed, outputs=wanted, block=length, progress=tick, live=address

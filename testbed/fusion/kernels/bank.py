@@ -440,10 +440,11 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
     with a table of `shared` behind that of Q (n_node, n, n, M), of which JOSEPH form takes the states before those of
     slow noise only.
     """
-    core = n - n_slow
+    states, readings, filters, fast = n, n_sensor, M, n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, nonzero, Q_in, shared, H_in, seen, R, Z, clocked, score, watch, setting, levels, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        n, n_sensor, M, core = np.int64(states), np.int64(readings), np.int64(filters), np.int64(fast)
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))

@@ -1,11 +1,13 @@
 """The compiled steps of the filters with one covariance, for sizes known to the compiler.
 
 `kalman_kernel`, `settling_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
-sensors): loops of constant length unroll. The last `n_slow` states are those of slow noise: each moves by itself and
-enters the others, which in Joseph form is made use of. They close over integers only, which numba's disk cache keys by
-value, so that a second process loads and does not compile. That cache watches no other file than the kernel's own: what
-calls each other stays in one file, which is why this one is long. `testbed.fusion.kernels.bank` and
-`testbed.fusion.two_paths.kernel` share numbers with it but no code; who changes such a number touches those files too.
+sensors): loops of constant length unroll. What they call is given these sizes as variables, so that numba compiles it
+once and not for every size; inlined into the loop they are constants again. The last `n_slow` states are those of slow
+noise: each moves by itself and enters the others, which in Joseph form is made use of. They close over integers only,
+which numba's disk cache keys by value, so that a second process loads and does not compile. That cache watches no other
+file than the kernel's own: what calls each other stays in one file, which is why this one is long.
+`testbed.fusion.kernels.bank` and `testbed.fusion.two_paths.kernel` share numbers with it but no code; who changes such
+a number touches those files too.
 
 The arrays handed in decide the precision: in single precision no sum of the state and covariance recursion is formed in
 double. `form` decides what stands for the covariance: P itself (CONVENTIONAL, JOSEPH), or, in SQUARE_ROOT, roots D and
@@ -512,10 +514,11 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
     (n_sensor, n_time); `outside` (n_sensor,) counts as in `outside_gate`; `out` (HEADER_ROWS + INNOVATION_ROWS *
     n_sensor, n_time) receives rate, std, and innovation and its variance of each reading.
     """
-    core = n - n_slow
+    states, readings, fast = n, n_sensor, n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, Q_in, H_in, R, Z, clocked, outside, started, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         # The branches on `form` are taken by the compiler.
         # Local copies have a constant shape, so their index arithmetic folds.
         kind = x_in.dtype
@@ -626,10 +629,11 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
     sensors could follow. `out` as in `kalman_kernel`. The table Q of `clocked` has one more axis in front, as Q; gains
     never settle where steps are of any length (`progress[EVERY]` is to be out of reach).
     """
-    core = n - n_slow
+    states, readings, fast = n, n_sensor, n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, Q_in, H_in, R, Z, clocked, cycle, progress, last, granted, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         H, g, gain, at = np.empty((n_sensor, n)), np.empty(n), np.empty(n), np.full(3, -1.0)
@@ -870,10 +874,11 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
     `progress` = [started, beta^k, guard hits of Q]. Q that
     adapts takes regular steps only. What the adaptation remembers is in double precision whatever the arrays are.
     """
-    core = n - n_slow
+    states, readings, fast = n, n_sensor, n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(x_in, P_in, F_in, Q_in, H_in, Z, clocked, sensors, windows, chosen, progress, forget, out):  # noqa: PLR0912, PLR0915  # pragma: no cover
+        n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         kind = x_in.dtype
         x, x_prior, P_prior, P_post = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
         moved, g, K = np.empty(n, kind), np.empty(n, kind), np.empty(n, kind)
@@ -983,10 +988,11 @@ def gains_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:
     n_sensor, n), `variance` (n_time, n_sensor) of the innovations and `std` (n_time,) of the rate are filled where
     there are some. Many states with the same gaps share them.
     """
-    core = n - n_slow
+    states, readings, fast = n, n_sensor, n - n_slow
 
     @njit(cache=True, error_model="numpy")
     def run(P_in, F_in, Q_in, H_in, R, due, started, gains, variance, std):  # pragma: no cover
+        n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         # No reading enters the covariance: a state and readings of zero stand for all.
         x, moved, g, K = np.zeros(n), np.empty(n), np.empty(n), np.empty(n)
         P, F, Q, work, H = (

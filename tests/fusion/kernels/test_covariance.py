@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from numba import njit
 
 from testbed.fusion import estimate
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters import kalman, shakf, steady_state, wideband
-from testbed.fusion.kernels.covariance import HEADER_ROWS, kalman_kernel, predict, update
+from testbed.fusion.kernels.covariance import HEADER_ROWS, innovation, kalman_kernel, predict, update
 from testbed.fusion.model import build_model
 from testbed.fusion.transitions import even
 
@@ -125,6 +126,20 @@ def test_nothing_is_predicted_before_the_first_reading() -> None:
     )
     assert np.array_equal(P, model.P0)
     assert np.array_equal(out[1], np.full(50, np.sqrt(model.P0[0, 0])))
+
+
+@pytest.mark.slow
+def test_what_a_kernel_calls_is_compiled_once_for_all_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A size that reaches it as a literal makes a version of its own: seconds more for every model that is new."""
+
+    def afresh(*sizes: Any) -> Any:
+        return njit(error_model="numpy")(kalman_kernel(*sizes).py_func)
+
+    monkeypatch.setattr(kalman, "kalman_kernel", afresh)
+    estimate("kalman", {"mems_gyro": np.zeros(2)}, sample_rate_hz={"mems_gyro": 2000.0})
+    for called in (predict, update, innovation):
+        assert called.signatures
+        assert not [signature for signature in called.signatures if "Literal" in str(signature)]
 
 
 _SECOND_START = """
