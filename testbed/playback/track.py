@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from testbed.logs.clock import NANO
-from testbed.runs.signals import Column
+from testbed.runs.signals import OneSignal
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ class Track:
     signals: Signals
 
     @property
-    def rate(self) -> Column:
+    def rate(self) -> OneSignal:
         """The rate [rad/s], read in blocks."""
-        return Column(self.signals, "rate")
+        return OneSignal(self.signals, "rate")
 
     def blocks(self) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
         """Yield stamps [ns] since the start of the run and rates [rad/s], shapes (n_block,)."""
@@ -47,5 +47,5 @@ class Track:
 
     def stamps(self, start: int, stop: int) -> NDArray[np.int64]:
         """Return the stamps [ns] of samples `start` <= k < `stop`, shape (n_time,), each rounded to the nearest."""
-        seconds = Column(self.signals, "time").read(start, stop)
+        seconds = OneSignal(self.signals, "time").read(start, stop)
         return np.rint(seconds / NANO).astype(np.int64)

@@ -101,7 +101,7 @@ class Signals(Mapping[str, "FloatArray"]):
 
 
 @dataclass(frozen=True)
-class Column:
+class OneSignal:
     """One signal of a group, read in blocks.
 
     Parameters
