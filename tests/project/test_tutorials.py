@@ -6,12 +6,12 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import testbed
+from tests.shell import call
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
@@ -54,8 +54,7 @@ def commands(text):
         # What installs is tried by whoever clones the repository.
         if word != "make":
             assert word == "testbed"
-            command = [sys.executable, "-m", "testbed", *arguments]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            done = call(*arguments, cwd=".")
             assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
