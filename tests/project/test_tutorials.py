@@ -72,6 +72,14 @@ def test_octave_reads_a_run_as_the_page_tells(tmp_path):
     assert f"rmse {run.metrics.fusion['kalman'].rmse_deg_s:.6f} deg/s" in done.stdout, done.stderr
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_what_the_base_install_lacks_is_said(page):
+    text = page.read_text(encoding="utf-8")
+    code = "".join(body for kind, body in FENCE.findall(text) if kind == "python")
+    if re.search(r"to_pandas|to_xarray|import (?:xarray|duckdb|pandas)", code):
+        assert "[notebook]'`" in text
+
+
 def test_there_are_five_of_them_and_each_has_code():
     assert {"first_run", "data_sheet", "own_log", "campaign", "link"} <= {page.stem for page in TUTORIALS}
     for page in TUTORIALS:
