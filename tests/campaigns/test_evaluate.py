@@ -39,8 +39,10 @@ def differences(ours, theirs, path=""):
 def agrees(scenario, seeds=SEEDS):
     found = testbed.evaluate(scenario, seeds)
     for seed, metrics in zip(seeds, found, strict=True):
-        expected = testbed.run(scenario, seed=seed).metrics
-        assert list(differences(metrics.to_dict(), expected.to_dict())) == []
+        expected = testbed.run(scenario, seed=seed).metrics.to_dict()
+        # What a run keeps for the picture in its report; many seeds at once have no fluid to look into.
+        expected.pop("profiles", None)
+        assert list(differences(metrics.to_dict(), expected)) == []
 
 
 def shortened(path):
