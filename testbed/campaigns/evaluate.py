@@ -26,7 +26,8 @@ def evaluate(
     seeds: Iterable[int],
     settings: Iterable[Mapping[str, Any]] | None = None,
 ) -> list[Any]:
-    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9.
+    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9,
+    but for the profiles of a fluid, which a run keeps for its report.
 
     Only `profiles`, the fluid over the height of a channel that a report draws, belong to a run alone.
     Nothing is written and no signal is kept: memory grows neither with the duration nor with the number of seeds, but
