@@ -1,23 +1,24 @@
 """`wideband` against the best fixed filter of every signal, and under a wrong belief: the figures of docs/wideband.md.
 
-Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, phase included, the second half
-judged. Of 20 s (the default) the slow error, the same in all filters, is the larger part; ``--duration 10`` shows more
-of what sets the filters apart. The fixed filters are `kalman` of order 3 on a decade grid of q, on the same readings;
+Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, phase included. Each record, 20 s
+long, begins in mid-motion, at an instant drawn by its seed, and no filter knows anything of its start; with ``--start
+rest`` the motion begins on a table at rest, and the filters know it. Judged are the root mean squares over all seeds
+from 5 to 10 and from 10 to 20 s. The fixed filters are `kalman` of order 3 on a decade grid of q, on the same readings;
 the grid is followed until the best one has a worse one on either side. The wheel is that of
 scenarios/satellite_microvibration.yaml: alone, through a run-up from 20 to 60 rev/s, and on the vibration of its
 platform.
 
-Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about 40
-s of processor time for each signal with ten seeds of 20 s. ``--mismatch`` prints the table of wrong beliefs instead,
-``--change`` the one of changing signals. ``--filters`` and ``--restart`` give `wideband` other parameters than its own
-in the first and the last, to see what they are for. ``--start unknown`` lets no filter know that the table rests at
-first.
+Run it with ``python examples/wideband_against_fixed.py [--seeds 10] [--signals "10 Hz" mixed] [--csv FILE]``: about
+70 s of processor time for each signal with ten seeds. ``--mismatch`` prints the table of wrong beliefs instead,
+``--change`` the one of changing signals, both from rest. ``--filters`` and ``--restart`` give `wideband` other
+parameters than its own in the first and the last, to see what they are for.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import functools
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,9 +46,11 @@ BELIEF = load_belief("identified")
 FIRST_SEED = 101
 SATELLITE = Path(__file__).parents[1] / "scenarios" / "satellite_microvibration.yaml"
 SINES_HZ = (0.1, 0.5, 2.0, 4.0, 10.0, 25.0, 100.0, 300.0, 500.0)
-# Of the issue that asked for the filter: medians [deg/s], and the ratio to the best fixed filter.
+# Asked for: error over that of the best fixed filter, at most, and claim over error; from rest also the error [deg/s].
+RATIO, CLAIM = 1.15, (0.7, 1.4)
 TARGETS = {"0.5 Hz": 0.0030, "4 Hz": 0.0030, "10 Hz": 0.0025, "mixed": 0.0035}
-RATIO = 1.15
+# A record that begins in mid-motion does so within this [s] of the motion; the sensors have run for as long before.
+ANYWHERE, RUN_UP = 10.0, 5.0
 
 
 def sine(freq: float, amplitude: float = 1.0) -> Motion:
@@ -68,10 +71,13 @@ def signals() -> dict[str, tuple[Sequence[Motion], int]]:
     return table
 
 
-def truth(motions: Sequence[Motion], duration: float) -> FloatArray:
-    """Return the rate [rad/s] at 20 kHz of an ideal table; random phases and spectra are drawn once for all seeds."""
-    t = np.arange(round(duration * RATES["mhd_ars"])) / RATES["mhd_ars"]
-    parts = [m.start(duration, random_stream(1, f"motion {i}"))(t) for i, m in enumerate(motions)]
+def truth(motions: Sequence[Motion], duration: float, begin: float = 0.0) -> FloatArray:
+    """Return the rate [rad/s] at 20 kHz of an ideal table from an instant [s] of its motion on; random phases and
+    spectra are drawn once for all seeds.
+    """
+    t = begin + np.arange(round(duration * RATES["mhd_ars"])) / RATES["mhd_ars"]
+    length = duration + (ANYWHERE if begin else 0.0)
+    parts = [m.start(length, random_stream(1, f"motion {i}"))(t) for i, m in enumerate(motions)]
     rate: FloatArray = np.sum(parts, axis=0)
     return rate
 
@@ -84,39 +90,57 @@ def readings(rate: FloatArray, seed: int, *, noise: bool = True) -> dict[str, Fl
     }
 
 
-def error_and_claim(
+def record(
+    motions: Sequence[Motion], duration: float, seed: int, start: str
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return rate and readings [rad/s] of a record that begins with the motion, on a table at rest, or in the middle of
+    it, at an instant drawn by the seed.
+    """
+    if start == "rest":
+        rate = truth(motions, duration)
+        return rate, readings(rate, seed)
+    begin = float(random_stream(seed, "begin").uniform(0.0, ANYWHERE))
+    rate = truth(motions, duration + RUN_UP, begin)
+    cut = {name: z[round(RUN_UP * RATES[name]) :] for name, z in readings(rate, seed).items()}
+    return rate[round(RUN_UP * RATES["mhd_ars"]) :], cut
+
+
+def errors_and_claims(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
-) -> tuple[float, float]:
-    """Return the error of a filter over the second half, and the standard deviation that it claims there [deg/s]."""
+) -> FloatArray:
+    """Return the error of a filter over the second quarter and over the second half, and the standard deviations that
+    it claims there [deg/s], shape (2, 2).
+    """
     block = estimate(name, z, sample_rate_hz=RATES, belief=belief, verdict=False, **{"start": "rest", **own})
-    late = slice(rate.size // 2, None)
-    error, claim = (float(np.sqrt(np.mean(of[late] ** 2)) / DEG) for of in (block.rate - rate, block.std))
-    return error, claim
+    n = rate.size
+    windows = slice(n // 4, n // 2), slice(n // 2, None)
+    return np.array([[rms(of[part]) / DEG for part in windows] for of in (block.rate - rate, block.std)])
+
+
+def rms(values: FloatArray) -> float:
+    """Return the root mean square, unit of `values`."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def rmse(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
 ) -> float:
     """Return the error of a filter over the second half [deg/s]."""
-    return error_and_claim(name, z, rate, belief, **own)[0]
+    return float(errors_and_claims(name, z, rate, belief, **own)[0, 1])
 
 
-def fixed(
-    z: dict[str, FloatArray],
-    rate: FloatArray,
-    decade: int,
-    belief: dict[str, SensorBelief] = BELIEF,
-    start: str = "rest",
-) -> float:
-    """Return the error of the order-3 filter with q = 10^decade (deg/s)^2/s^5 [deg/s]."""
-    return rmse("kalman", z, rate, belief, order=3, q=10.0**decade * DEG**2, start=start)
+def order_three(decade: int) -> dict[str, Any]:
+    """Return the parameters of the fixed filter with q = 10^decade (deg/s)^2/s^5."""
+    return {"order": 3, "q": 10.0**decade * DEG**2}
 
 
 def best_fixed(errors: Callable[[int], FloatArray], decade: int) -> tuple[int, FloatArray]:
-    """Return the decade of the smallest median error, worse ones on either side of it, and the errors of its seeds."""
+    """Return the decade whose errors have the least root mean square, worse ones on either side of it, and the errors
+    of its seeds.
+    """
     known = {d: errors(d) for d in (decade - 1, decade, decade + 1)}
     while True:
-        best = min(known, key=lambda d: float(np.median(known[d])))
+        best = min(known, key=lambda d: rms(known[d]))
         beside = [d for d in (best - 1, best + 1) if d not in known]
         if not beside:
             return best, known[best]
@@ -125,60 +149,67 @@ def best_fixed(errors: Callable[[int], FloatArray], decade: int) -> tuple[int, F
 
 @dataclass(frozen=True)
 class Judgement:
-    """Errors of `wideband` and of the best fixed filter for one signal [deg/s].
+    """Errors of `wideband` and of the best fixed filter for one signal, root mean squares over all seeds [deg/s].
 
-    `ratio` is the median of the ratios of the pairs with the same noise, `ratio_of_medians` what it says, `claim` the
-    root mean square that `wideband` claims over its error, over all seeds.
+    `begin` and `end` say over which seconds of the records; `ratio` is error over error, `claim` what `wideband` claims
+    over its error.
     """
 
     signal: str
+    begin: float
+    end: float
     seeds: int
     wideband: float
     largest: float
     fixed: float
     fixed_log10_q: int
     ratio: float
-    ratio_of_medians: float
     claim: float
 
 
-def judge(label: str, seeds: Sequence[int], duration: float, start: str = "rest", **own: float) -> Judgement:
-    """Judge one signal of `signals` over paired seeds from one start; `own` are parameters of `wideband`."""
+def judge(
+    label: str, seeds: Sequence[int], duration: float, start: str = "unknown", **own: float
+) -> tuple[Judgement, Judgement]:
+    """Judge the second quarter and the second half of one signal of `signals` over paired seeds from one start; `own`
+    are parameters of `wideband`.
+    """
     motions, decade = signals()[label]
-    rate = truth(motions, duration)
-    records = [readings(rate, seed) for seed in seeds]
-    pairs = [error_and_claim("wideband", z, rate, BELIEF, start=start, **own) for z in records]
-    ours, claims = np.array(pairs).T
-    at, theirs = best_fixed(lambda d: np.array([fixed(z, rate, d, start=start) for z in records]), decade)
-    middle, other = float(np.median(ours)), float(np.median(theirs))
-    ratio = float(np.median(ours / theirs))
-    claim = float(np.sqrt(np.mean(claims**2) / np.mean(ours**2)))
-    return Judgement(label, len(seeds), middle, float(ours.max()), other, at, ratio, middle / other, claim)
+    records = [record(motions, duration, seed, start) for seed in seeds]
+
+    @functools.cache
+    def found(name: str, decade: int | None = None) -> FloatArray:
+        parameters = own if decade is None else order_three(decade)
+        return np.array([errors_and_claims(name, z, rate, BELIEF, start=start, **parameters) for rate, z in records])
+
+    judgements = []
+    for k, (begin, end) in enumerate(((0.25 * duration, 0.5 * duration), (0.5 * duration, duration))):
+        ours, claims = found("wideband")[:, :, k].T
+        at, theirs = best_fixed(lambda d, k=k: found("kalman", d)[:, 0, k], decade)
+        error, other = rms(ours), rms(theirs)
+        figures = error, float(ours.max()), other, at, error / other, rms(claims) / error
+        judgements.append(Judgement(label, begin, end, len(seeds), *figures))
+    return judgements[0], judgements[1]
 
 
 def against_fixed(
-    labels: Sequence[str],
-    seeds: Sequence[int],
-    duration: float,
-    target: Path | None,
-    start: str,
-    own: dict[str, float],
+    labels: Sequence[str], seeds: Sequence[int], duration: float, target: Path | None, start: str, own: dict[str, float]
 ) -> None:
-    """Print a line per signal, and write them to a file."""
+    """Print two lines per signal, and write them to a file."""
     print(
-        f"{'signal':>16} wideband  largest    fixed   its q   ratio  of medians  claim   deg/s, start {start}, "
-        f"{len(seeds)} seeds, {duration:g} s"
+        f"{'signal':>16}  seconds wideband  largest    fixed   its q   ratio  claim   deg/s, start {start}, "
+        f"{len(seeds)} seeds"
     )
     rows = []
     for label in labels:
-        row = judge(label, seeds, duration, start, **own)
-        rows.append(asdict(row))
-        met = max(row.ratio, row.ratio_of_medians) <= RATIO and row.wideband <= TARGETS.get(label, np.inf)
-        print(
-            f"{label:>16}{row.wideband:9.5f}{row.largest:9.5f}{row.fixed:9.5f}{'1e' + str(row.fixed_log10_q):>8}"
-            f"{row.ratio:8.3f}{row.ratio_of_medians:12.3f}{row.claim:7.2f}   {'met' if met else 'MISSED'}",
-            flush=True,
-        )
+        for row in judge(label, seeds, duration, start, **own):
+            rows.append(asdict(row))
+            met = row.ratio <= RATIO and CLAIM[0] <= row.claim <= CLAIM[1]
+            met = met and (start == "unknown" or row.wideband <= TARGETS.get(label, np.inf))
+            print(
+                f"{label:>16}{f'{row.begin:g}-{row.end:g}':>9}{row.wideband:9.5f}{row.largest:9.5f}{row.fixed:9.5f}"
+                f"{'1e' + str(row.fixed_log10_q):>8}{row.ratio:8.3f}{row.claim:7.2f}   {'met' if met else 'MISSED'}",
+                flush=True,
+            )
     if target:
         with target.open("w", newline="") as file:
             writer = csv.DictWriter(file, fieldnames=list(rows[0]))
@@ -205,7 +236,7 @@ def mismatch_ratios(
     readings without noise.
     """
     rate = truth([sine(freq)], duration)
-    forced = fixed(readings(rate, 0, noise=False), rate, decade, wrong)
+    forced = rmse("kalman", readings(rate, 0, noise=False), rate, wrong, **order_three(decade))
     rows = []
     for seed in seeds:
         z = readings(rate, seed)
@@ -293,9 +324,14 @@ def main() -> None:
     """Print the table asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10, help="how many")
-    parser.add_argument("--duration", type=float, default=20.0, help="of a run in s")
+    parser.add_argument(
+        "--duration",
+        type=float,
+        default=20.0,
+        help="of a record in s; judged are its second quarter and its second half",
+    )
     parser.add_argument("--signals", nargs="+", default=list(signals()), choices=list(signals()), metavar="SIGNAL")
-    parser.add_argument("--start", choices=("rest", "unknown"), default="rest", help="what both filters know of it")
+    parser.add_argument("--start", choices=("unknown", "rest"), default="unknown", help="of the records")
     parser.add_argument("--csv", type=Path, help="where to write the table")
     parser.add_argument("--filters", type=int, help="in the bank of `wideband`, over the same decades")
     parser.add_argument("--restart", type=float, help="of `wideband`; 1e12 is never")

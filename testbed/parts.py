@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import importlib
 from importlib import resources
@@ -91,12 +92,15 @@ def preset_names(package: str) -> list[str]:
 
 
 @functools.cache
-def _preset_text(package: str, name: str) -> str:
+def _preset(package: str, name: str) -> dict[str, Any]:
+    from ruamel.yaml import YAML
+
     names = preset_names(package)
     if name not in names:
         kind = "preset"
         raise UnknownNameError(kind, name, names)
-    return (resources.files(package) / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
+    text = (resources.files(package) / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
+    return cast("dict[str, Any]", YAML(typ="safe", pure=True).load(text))
 
 
 def preset(package: str, name: str) -> dict[str, Any]:
@@ -107,9 +111,7 @@ def preset(package: str, name: str) -> dict[str, Any]:
     UnknownNameError
         If there is no such preset; lists the known ones.
     """
-    from ruamel.yaml import YAML
-
-    return cast("dict[str, Any]", YAML(typ="safe", pure=True).load(_preset_text(package, name)))
+    return copy.deepcopy(_preset(package, name))
 
 
 def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,7 +27,7 @@ axes.loglog(frequency, 3600.0 * np.degrees(np.sqrt(both)) / 60.0, "k:", lw=2.5, 
 for at in crossovers(mhd.input_noise_psd, gyro.input_noise_psd):
     axes.axvline(at, color="grey", lw=0.8)
     axes.annotate(f" {at:.2g} Hz", (at, 0.97), xycoords=("data", "axes fraction"), va="top")
-axes.set(xlabel="frequency [Hz]", ylabel="root density, two-sided [deg/$\\sqrt{\\mathrm{h}}$]", ylim=(1e-3, 30.0))
+axes.set(xlabel="frequency [Hz]", ylabel="root density, two-sided [deg/$\\sqrt{\\mathrm{h}}$]", ylim=(1e-4, 30.0))
 axes.legend()
 axes.grid(visible=True, alpha=0.4)
 plt.show()

@@ -2,7 +2,7 @@ r"""
 Error against frequency: which filter for which band?
 =====================================================
 
-A sine of 1 deg/s at six frequencies, every filter with its defaults, beside the error of the best linear filter made
+A sine of 1 deg/s at five frequencies, every filter with its defaults, beside the error of the best linear filter made
 for each.
 The bands are the least and the largest of three seeds: one seed would rank the filters by its luck.
 """
@@ -12,15 +12,15 @@ import numpy as np
 
 import testbed
 
-FREQUENCIES = (0.5, 2.0, 10.0, 30.0, 100.0, 250.0)
+FREQUENCIES = (0.5, 2.0, 10.0, 50.0, 250.0)
 SEEDS = 3
 FILTERS = ("kalman", "wideband", "complementary")
 
 base = testbed.Scenario.from_dict(
     {
         "name": "one_line",
-        "duration": "1.5 s",
-        "settle": "0.75 s",
+        "duration": "0.8 s",
+        "settle": "0.4 s",
         "turntable": {"engine": "modal"},
         "motion": [{"sine": {"frequency": "1 Hz", "rate": "1 deg/s"}}],
         "sensors": {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}},

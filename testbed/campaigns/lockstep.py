@@ -15,8 +15,10 @@ from testbed.runs.block import RunBlock
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from testbed.fusion.base import EstimateBlock, Received
     from testbed.runs.metrics import RunMetrics
     from testbed.scenario.model import Scenario
+    from testbed.signals import FloatArray
 
 # Seeds whose signals of a block are there at a time.
 _PACK = 16
@@ -86,10 +88,7 @@ class Lockstep:
         for k in range(0, len(self._seeds), _PACK):
             pack = self._seeds[k : k + _PACK]
             readings = [sensor.readings(pack) for _, sensor in self._sensors]
-            estimates = [
-                stage.process({name: readings[i] for name, i in reads.items()}, pack)
-                for (_, _, reads, _), stage in self._filters
-            ]
+            estimates = self._estimated(readings, pack)
             for i, (reads, made) in enumerate(zip(self._reads, self._estimates, strict=True)):
                 for j, seed in enumerate(pack):
                     sensed = {name: readings[at][j] for name, at in reads.items()}
@@ -98,6 +97,20 @@ class Lockstep:
                     sight = self._sights[i, seed].process(truth.rate, truth.sensor_rate, sensed, rates)
                     block = RunBlock(command.start, command, truth, sensed, found, {}, pointing=sight)
                     self._judges[i, seed].write(block)
+
+    def _estimated(self, readings: Sequence[list[FloatArray]], pack: Sequence[int]) -> list[list[EstimateBlock]]:
+        """Return the estimates of each filter; those that receive the same of the same readings do so once."""
+        estimates: list[list[EstimateBlock]] = []
+        known: dict[Any, list[Received]] = {}
+        for (_, _, reads, _), stage in self._filters:
+            given, received = {name: readings[i] for name, i in reads.items()}, None
+            if stage.front is not None:
+                key = (stage.front, *reads.items())
+                if key not in known:
+                    known[key] = stage.received(given, pack)
+                received = known[key]
+            estimates.append(stage.process(given, pack, received))
+        return estimates
 
     def metrics(self, case: int, seed: int, versions: Mapping[str, str]) -> RunMetrics:
         """Return the metrics of a case under a seed.

@@ -16,7 +16,7 @@ from testbed.sensors.checked import CheckedSensor
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from testbed.fusion.base import EstimateBlock
+    from testbed.fusion.base import EstimateBlock, Received
     from testbed.models.turntable.turntable import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.sensors.base import SensorStage
@@ -100,6 +100,8 @@ class ManyFilters:
     def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int]) -> None:
         spec = scenario.fusion[name]
         self._shipped = spec.type in FILTERS
+        # Filters with an equal one receive the same of equal readings; None has what nobody else has.
+        self.front: Any = None
         if self._shipped:
             rates = {sensor: part.sample_rate for sensor, part in scenario.sensors.items()}
             first = spec.start(rates)
@@ -107,10 +109,21 @@ class ManyFilters:
             self._stages = {seed: deepcopy(first) for seed in seeds}
             self._together = Together(first)
             self._onsets = {seed: Onset(scenario) for seed in seeds if scenario.frame.fusion_from}
+            self.front = None if self._onsets else first.front()
         else:
             self._stages = {seed: start_filter(scenario, name, spec) for seed in seeds}
 
-    def process(self, readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[EstimateBlock]:
+    def received(self, readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[Received]:
+        """Return what shipped filters receive of the readings of a block; arguments as for `process`."""
+        stages = [self._stages[seed] for seed in seeds]
+        return [stage.received(given) for stage, given in zip(stages, _by_seed(readings, seeds), strict=True)]
+
+    def process(
+        self,
+        readings: Mapping[str, Sequence[FloatArray]],
+        seeds: Sequence[int],
+        received: Sequence[Received] | None = None,
+    ) -> list[EstimateBlock]:
         """Return the estimates over a block under some of the seeds; of the diagnostics at least innovations, their
         variances and counts of the gate. They hold until the next call.
 
@@ -120,13 +133,17 @@ class ManyFilters:
             By sensor, the readings under each of these seeds [rad/s].
         seeds : sequence of int
             Some of those given at the start.
+        received : sequence of tuple of ndarray, optional
+            What is received of them, by a filter with an equal `front`; in every block or in none.
         """
         stages = [self._stages[seed] for seed in seeds]
-        given = [{name: values[j] for name, values in readings.items()} for j in range(len(seeds))]
+        if self._shipped and received is not None:
+            return self._together.process(stages, received)
+        given = _by_seed(readings, seeds)
         if self._shipped and self._onsets:
             return self._late(stages, given, seeds)
         if self._shipped:
-            return self._together.process(stages, given)
+            return self._together.process(stages, self.received(readings, seeds))
         return [stage.process(values) for stage, values in zip(stages, given, strict=True)]
 
     def _late(
@@ -138,5 +155,9 @@ class ManyFilters:
         blank = [stages[0].blank(longest(unseen))] if longest(unseen) else []
         if blank and not longest(seen):
             return blank * len(seeds)
-        found = self._together.process(stages, [values for _, values in parts])
-        return [joined([*blank, one]) for one in found]
+        received = [stage.received(values) for stage, (_, values) in zip(stages, parts, strict=True)]
+        return [joined([*blank, one]) for one in self._together.process(stages, received)]
+
+
+def _by_seed(readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[dict[str, FloatArray]]:
+    return [{name: values[j] for name, values in readings.items()} for j in range(len(seeds))]

@@ -97,6 +97,10 @@ class Gate:
         self._state = np.zeros((len(rates), ENTRIES))
         self._state[:, [LAST, WAITING]], self._state[:, SEEN] = np.nan, -1.0
 
+    def key(self) -> bytes:
+        """Return what tells the setting from another one."""
+        return self._setting.tobytes()
+
     def process(self, Z: FloatArray) -> FloatArray:
         """Set the readings that are none to infinite; return how many of each sensor there have been so far.
 

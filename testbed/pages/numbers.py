@@ -48,7 +48,9 @@ def fixed(value: float | None, decimals: int) -> str:
     """Return `value` with `decimals` decimals; a dash for None and NaN."""
     if value is None or not math.isfinite(value):
         return DASH
-    return f"{value:.{decimals}f}".replace("-", "−")
+    text = f"{value:.{decimals}f}"
+    # What rounds to zero has no sign.
+    return ("−" if float(text) < 0.0 else "") + text.removeprefix("-")
 
 
 def plain(value: float) -> str:

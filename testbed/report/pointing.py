@@ -46,7 +46,7 @@ def sight_rows(metrics: RunMetrics) -> list[dict[str, Any]]:
     rows = []
     for name, sight in metrics.pointing.items():
         spectral = (sight.model_extra or {}).get("spectral", {}).get("rpe_urad", {})
-        for key in sight.rpe_urad:
+        for key in sorted(sight.rpe_urad, key=float):
             errors = {kind: getattr(sight, f"{kind}_urad").get(key) for kind in ("rpe", "mpe", "pde", "pre")}
             rows.append({"filter": name, "window": window_text(key), "spectral": spectral.get(key), **errors})
     return rows

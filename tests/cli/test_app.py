@@ -15,29 +15,11 @@ from ruamel.yaml import YAML
 
 from tests.scenario.test_loader import GOOD, SCENARIOS
 from tests.scenes import short_file
-
-
-def call(*arguments, cwd, **options):
-    return subprocess.run(
-        [sys.executable, "-m", "testbed", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-        **options,
-    )
-
-
-def assert_clear(result, status):
-    """One message on standard error, the status of the contract, no traceback."""
-    assert result.returncode == status, result.stderr
-    assert result.stderr.strip()
-    assert "Traceback" not in result.stderr
+from tests.shell import assert_clear, call, spawn
 
 
 def test_run_prints_a_table_and_writes_the_run_folder(tmp_path):
-    result = call("run", short_file(tmp_path), cwd=tmp_path)
+    result = spawn("run", short_file(tmp_path), cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     for text in (
         "error against the truth in deg/s",
@@ -134,7 +116,7 @@ def limit_file_size():
 
 @pytest.mark.skipif(os.name != "posix", reason="file size limits are POSIX")
 def test_a_full_disk_ends_with_3_and_leaves_nothing(tmp_path):
-    result = call("run", short_file(tmp_path), cwd=tmp_path, preexec_fn=limit_file_size)
+    result = spawn("run", short_file(tmp_path), cwd=tmp_path, preexec_fn=limit_file_size)
     assert_clear(result, 3)
     assert "the run got as far as t = 0 s" in result.stderr
     assert not list(tmp_path.glob("runs/*"))

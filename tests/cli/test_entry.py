@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from testbed.errors import Problem, RunError, ScenarioError, UnknownNameError
-from tests.cli.test_app import assert_clear, call
 from tests.scenes import short_file
+from tests.shell import assert_clear, call
 
 # Runs the command line after a piece of it was replaced.
 BROKEN = """\

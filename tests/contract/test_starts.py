@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from testbed.fusion import estimate
 from tests.contract.records import METHODS, NAMES, named
@@ -22,15 +23,19 @@ def taking_start() -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROMISING)
 def test_a_record_may_begin_in_mid_motion_or_inside_a_constant_rate(name: str) -> None:
-    """Two seeds, one phase each; a claim over an error of two independent runs is within 2.5 of its mean."""
+    """Two seeds, one phase each, and one of what goes through its record many times: a claim over an error of two
+    independent runs is within 2.5 of its mean.
+    """
+    seeds = (1,) if name == "self_calibrating" else (1, 2)
     found, limits = {}, np.array(METHODS[name].start_leaves) / DEG
     for label, motion in (("motion", mixed), ("constant", offset_mixed)):
-        runs = [judged(name, *cut(*long_record(motion, 19.5, seed), 5.0 + 0.4 * seed), 10.0, 14.0) for seed in (1, 2)]
+        runs = [judged(name, *cut(*long_record(motion, 19.5, seed), 5.0 + 0.4 * seed), 10.0, 14.0) for seed in seeds]
         found[label] = [rms(np.array(column)) for column in zip(*runs, strict=True)]
-    # Scatter of two runs: their mean square is within 3.5 of its expectation with a probability of 0.97 (chi-square
-    # of two), so the limits of the mean over 20 seeds are met within sqrt(3.5).
-    assert found["motion"][0] < 1.9 * limits[0]
-    assert found["constant"][0] < 1.9 * limits[1]
+    # Scatter of the runs: with a probability of 0.97 their mean square is within 3.5 of its expectation for two, 4.7
+    # for one (chi-square), so the limits of the mean over 20 seeds are met within the root of that.
+    scatter = np.sqrt(chi2.ppf(0.97, len(seeds)) / len(seeds))
+    assert found["motion"][0] < scatter * limits[0]
+    assert found["constant"][0] < scatter * limits[1]
     if not METHODS[name].dishonest and not METHODS[name].needs_both:
         assert 0.7 / 1.9 < found["motion"][1] / found["motion"][0] < 1.4 * 2.5
 

@@ -15,8 +15,8 @@ from testbed.errors import RunError, ScenarioError
 from testbed.judging.allan_analysis import TERMS, allan_figure, analyse, write_figure
 from testbed.judging.allan_records import RateRecord, read_run
 from testbed.sensors.noise import GyroNoise
-from tests.cli.test_app import assert_clear, call
 from tests.scenes import short_file
+from tests.shell import assert_clear, call
 
 # Data-sheet values of the ADIS16505 in SI: 0.15 deg/sqrt(h) and 2.7 deg/h.
 N = np.deg2rad(0.15) / 60.0

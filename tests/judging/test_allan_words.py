@@ -15,7 +15,7 @@ from testbed.judging.allan_words import data_sheet, remarks_on, write_imu
 from testbed.judging.rounding import is_rounding
 from testbed.metrics.lines import spectral_lines
 from testbed.sensors.noise import GyroNoise
-from tests.cli.test_app import call
+from tests.shell import call
 
 N = np.deg2rad(0.15) / 60.0
 FS = 200.0

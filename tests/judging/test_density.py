@@ -14,7 +14,7 @@ from testbed.judging.density import band_edges, difference, estimate_density
 from testbed.judging.density_figure import density_figure
 from testbed.pages.palette import color_of
 from testbed.sensors.noise import GyroNoise
-from tests.cli.test_app import assert_clear, call
+from tests.shell import assert_clear, call
 
 N, FS = 1e-4, 500.0
 

@@ -15,8 +15,8 @@ from testbed.logs.inspection import inspect
 from testbed.logs.proposal import propose
 from testbed.logs.selection import Selection
 from testbed.logs.values import ValueScan, word_size
-from tests.cli.test_app import assert_clear, call
 from tests.logs.kinds import COUNTS, DEG, N_TIME, RATE, SECONDS, TEXTS, lines
+from tests.shell import assert_clear, call
 
 
 def reports(tmp_path, text):

@@ -14,8 +14,8 @@ from testbed.logs import keeping, read_log
 from testbed.logs.formats import open_table
 from testbed.logs.means import Means, Places
 from testbed.logs.selection import Selection
-from tests.cli.test_app import call
 from tests.logs.kinds import ANGLE, DEG, RATE, SECONDS, digits, lines
+from tests.shell import call
 
 
 def log(tmp_path, *columns, head="t,w [deg/s]\n"):

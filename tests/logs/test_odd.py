@@ -13,8 +13,8 @@ from testbed.logs.formats import open_table
 from testbed.logs.inspection import inspect
 from testbed.logs.proposal import propose
 from testbed.logs.selection import Selection, TextOptions
-from tests.cli.test_app import call
 from tests.logs.kinds import DEG, ISO, N_TIME, RATE, SECONDS, TIME_US, lines
+from tests.shell import call
 
 
 def pandas_table(path):

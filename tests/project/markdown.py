@@ -1,6 +1,6 @@
 """Give the pages one sentence a line, of at most 120 characters: `python -m tests.project.markdown`.
 
-Tables, code, directives and HTML stay as they are; what a page says does not change.
+Tables, code, directives with their options, and HTML stay as they are; what a page says does not change.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _BLANK = "\u2060"
 _SHORT = "".join(rf"(?<!\b{word}\.)" for word in (r"e\.g", r"i\.e", "et al", "vs", "cf", "Trans", "Instrum", "Meas"))
 _END = re.compile(rf"(?<=[.!?]){_SHORT} +(?=[A-Z`*\[(\"0-9])")
 _ITEM = re.compile(r"^(\s*)(?:[-*]|\d+\.|:)\s+")
-_VERBATIM = re.compile(r"^\s*(?:\||#|<|>|:{3,}|\(|\[[^\]]+\]:|---|={3,}|$)")
+_VERBATIM = re.compile(r"^\s*(?:\||#|<|>|:{3,}|:[a-z][a-z-]*:|\(|\[[^\]]+\]:|---|={3,}|$)")
 
 
 def sentences(text: str, width: int) -> list[str]:

@@ -59,6 +59,13 @@ def test_every_page_is_in_the_contents():
     assert written - contents == {"index"}
 
 
+def test_the_options_of_a_directive_have_lines_of_their_own():
+    """Two on one are the first with a long value: cards of the first page that led nowhere."""
+    pages = [path for path in DOCS.rglob("*.md") if not {"_build", "_static"} & set(path.parts)]
+    lines = [line for path in pages for line in path.read_text("utf-8").splitlines()]
+    assert [line for line in lines if re.match(r"\s*:[a-z-]+:.* :[a-z-]+:", line)] == []
+
+
 def test_the_gallery_has_a_question_and_a_picture_a_script():
     scripts = sorted(GALLERY.glob("plot_*.py"))
     assert len(scripts) >= 12

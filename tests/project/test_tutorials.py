@@ -6,12 +6,12 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import testbed
+from tests.shell import call
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
@@ -54,8 +54,7 @@ def commands(text):
         # What installs is tried by whoever clones the repository.
         if word != "make":
             assert word == "testbed"
-            command = [sys.executable, "-m", "testbed", *arguments]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            done = call(*arguments, cwd=".")
             assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
@@ -71,6 +70,14 @@ def test_octave_reads_a_run_as_the_page_tells(tmp_path):
     if "netcdf" in done.stderr and "not found" in done.stderr:
         pytest.skip(f"octave has no package netcdf (Debian: octave-netcdf): {done.stderr.strip()}")
     assert f"rmse {run.metrics.fusion['kalman'].rmse_deg_s:.6f} deg/s" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_what_the_base_install_lacks_is_said(page):
+    text = page.read_text(encoding="utf-8")
+    code = "".join(body for kind, body in FENCE.findall(text) if kind == "python")
+    if re.search(r"to_pandas|to_xarray|import (?:xarray|duckdb|pandas)", code):
+        assert "[notebook]'`" in text
 
 
 def test_there_are_five_of_them_and_each_has_code():

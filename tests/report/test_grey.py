@@ -13,6 +13,7 @@ from PIL import Image
 import testbed
 from testbed.campaigns.curves import Point, Summary
 from testbed.campaigns.figures import figures_of
+from testbed.campaigns.rows import RESIDUAL
 from testbed.pages.palette import NAMED, series_marks
 from testbed.pages.svg import figure_bytes
 from testbed.report import run_figures
@@ -55,12 +56,13 @@ def test_two_runs_side_by_side(run):
 def test_the_curves_of_a_campaign():
     def point(value):
         pair = (value / 2, value, 2 * value)
-        return Point(0, {"f": value}, 3, value / 2, value, 2 * value, value, value / 3, value / 4, 1.0, pair, pair, 1)
+        bounds = (value / 2, value, 2 * value, value, value / 3, value / 4)
+        return Point(0, {"f": value}, 3, *bounds, 1.0, pair, pair, 1, {RESIDUAL: pair})
 
     points = [point(value) for value in (1.0, 3.0, 10.0, 30.0)]
     sources = [("sensor", "mhd_ars"), ("sensor", "mems_gyro"), *(("filter", name) for name in MANY["fusion"])]
     drawn = figures_of(Summary(dict.fromkeys(sources, points), [], []), ["f"])
-    assert {"errors", "response"} <= set(drawn)
+    assert {"errors", "response", "sight"} <= set(drawn)
     assert [(name, *pair) for name, figure in drawn.items() for pair in confused(figure)] == []
 
 

@@ -143,7 +143,7 @@ def _cached(
     start: StartKind,
     window: tuple[float, float] | None,
 ) -> list[SignalBound]:
-    search = _Search(dict(belief), dict(sample_rate_hz), signals, start, window)
+    search = _Search(belief, sample_rate_hz, signals, start, window)
     coarse = [
         search.best(order, np.logspace(*DECADES[order], DECADES[order][1] - DECADES[order][0] + 1)) for order in _ORDERS
     ]
@@ -163,51 +163,76 @@ class _Search:
 
     def __init__(
         self,
-        belief: dict[str, SensorBelief],
-        sample_rate_hz: dict[str, float],
+        belief: tuple[tuple[str, SensorBelief], ...],
+        sample_rate_hz: tuple[tuple[str, float], ...],
         signals: tuple[Lines, ...],
         start: StartKind,
         window: tuple[float, float] | None,
     ) -> None:
-        self._belief, self._rates, self._start, self._window = belief, sample_rate_hz, start, window
+        self._filters = functools.partial(_candidates, belief, sample_rate_hz, start, window)
         self._freq = np.array([freq for lines in signals for freq, _ in lines])
         self._power = np.array([0.5 * amplitude**2 for lines in signals for _, amplitude in lines])
         self._of_signal = np.repeat(np.eye(len(signals)), [len(lines) for lines in signals], axis=0)
+        known = dict(belief)
         self._truth: ComplexArray = np.array(
-            [belief[name].realisation().response(self._freq) for name in sample_rate_hz]
+            [known[name].realisation().response(self._freq) for name, _ in sample_rate_hz]
         )
 
     def best(self, order: int, q: FloatArray) -> list[SignalBound]:
         """Return the best of the candidates of one order, signal by signal."""
-        noise, lag = np.zeros(q.size), np.zeros((q.size, self._of_signal.shape[1]))
-        for weight, filters in self._times(order, q):
-            low, high = np.split(filters.posterior()[:, :, 0, 0].mean(axis=0), 2)
-            noise += weight * (0.5 * (low + high) - (high - low) / (2.0 * _HALF_STEP))
+        noise, times = self._filters(order, tuple(q.tolist()))
+        lag = np.zeros((q.size, self._of_signal.shape[1]))
+        for weight, filters in times:
             error = filters.line_error(self._freq, self._truth) ** 2 * self._power @ self._of_signal
             lag += weight * 0.5 * (error[: q.size] + error[q.size :])
-        # Where the start's covariance swamps what is left of it, rounding may leave less than nothing: no candidate.
-        noise = np.where(noise > 0.0, noise, np.inf)
         at = np.argmin(noise[:, None] + lag, axis=0)
         return [_bound(noise[i], lag[i, k], order, q[i]) for k, i in enumerate(at)]
 
-    def _times(self, order: int, q: FloatArray) -> Iterator[tuple[float, FixedFilters]]:
-        """Yield weights and filters, half a step of ln q below each q and half a step above."""
-        pairs = np.concatenate([q * np.exp(-_HALF_STEP), q * np.exp(_HALF_STEP)])
-        model = build_model(self._belief, self._rates, order=order, q=0.0, coloured=True, start=self._start)
-        unit = build_model(self._belief, self._rates, order=order, q=1.0, coloured=True, start=self._start)
-        Q = model.Q + pairs[:, None, None] * (unit.Q - model.Q)
-        period = period_map(model, Q)
-        if self._window is None:
-            for _ in range(_DOUBLINGS):
-                period = period.then(period)
-            yield 1.0, filters_from(model, pairs, Q, period.applied(model.P0))
-            return
-        begin, end = self._window
-        nodes, weights = np.polynomial.legendre.leggauss(_TIMES)
-        times = begin + 0.5 * (nodes + 1.0) * (end - begin)
-        counts = np.maximum(np.rint(times * model.sample_rate_hz / model.cycle), 0).astype(int).tolist()
-        for weight, P in zip(0.5 * weights, _after_periods(period, model.P0, counts), strict=True):
-            yield float(weight), filters_from(model, pairs, Q, P)
+
+# The signal has no part in them, so that the cases of a campaign share them: a megabyte or two each.
+@functools.lru_cache(maxsize=16)
+def _candidates(
+    belief: tuple[tuple[str, SensorBelief], ...],
+    sample_rate_hz: tuple[tuple[str, float], ...],
+    start: StartKind,
+    window: tuple[float, float] | None,
+    order: int,
+    q: tuple[float, ...],
+) -> tuple[FloatArray, list[tuple[float, FixedFilters]]]:
+    """Return what the sensors' noise leaves of each candidate [rad^2/s^2], and weights and filters of the window."""
+    noise, times = np.zeros(len(q)), list(_times(dict(belief), dict(sample_rate_hz), start, window, order, np.array(q)))
+    for weight, filters in times:
+        low, high = np.split(filters.posterior()[:, :, 0, 0].mean(axis=0), 2)
+        noise += weight * (0.5 * (low + high) - (high - low) / (2.0 * _HALF_STEP))
+    # Where the start's covariance swamps what is left of it, rounding may leave less than nothing: no candidate.
+    return np.where(noise > 0.0, noise, np.inf), times
+
+
+def _times(
+    belief: dict[str, SensorBelief],
+    sample_rate_hz: dict[str, float],
+    start: StartKind,
+    window: tuple[float, float] | None,
+    order: int,
+    q: FloatArray,
+) -> Iterator[tuple[float, FixedFilters]]:
+    """Yield weights and filters, half a step of ln q below each q and half a step above."""
+    pairs = np.concatenate([q * np.exp(-_HALF_STEP), q * np.exp(_HALF_STEP)])
+    model = build_model(belief, sample_rate_hz, order=order, q=0.0, coloured=True, start=start)
+    unit = build_model(belief, sample_rate_hz, order=order, q=1.0, coloured=True, start=start)
+    Q = model.Q + pairs[:, None, None] * (unit.Q - model.Q)
+    period = period_map(model, Q)
+    if window is None:
+        for _ in range(_DOUBLINGS):
+            period = period.then(period)
+        yield 1.0, filters_from(model, pairs, Q, period.applied(model.P0))
+        return
+    begin, end = window
+    nodes, weights = np.polynomial.legendre.leggauss(_TIMES)
+    times = begin + 0.5 * (nodes + 1.0) * (end - begin)
+    counts = np.maximum(np.rint(times * model.sample_rate_hz / model.cycle), 0).astype(int).tolist()
+    for weight, P in zip(0.5 * weights, _after_periods(period, model.P0, counts), strict=True):
+        yield float(weight), filters_from(model, pairs, Q, P)
 
 
 def _after_periods(period: CycleMap, P0: FloatArray, counts: Sequence[int]) -> Iterator[FloatArray]:

@@ -12,6 +12,7 @@ from testbed.fusion.base import Rows
 from testbed.fusion.filters.kalman import KalmanParameters
 from testbed.fusion.kernels.literature import vb_akf_kernel
 from testbed.fusion.model_filter import FilterParameters, ModelFilter
+from testbed.fusion.transitions import EVEN, Steps
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -71,7 +72,6 @@ class VbAkf(ModelFilter):
     """
 
     Parameters: ClassVar[type[Part]] = VbAkfParameters
-    any_clock = False
     rows = Rows(per_sensor=("innovation", "innovation_variance", "R"))
 
     def __init__(
@@ -87,7 +87,6 @@ class VbAkf(ModelFilter):
         """About how long a step takes, compiled, on a core of 2020 [s]."""
         return 1e-7 + (2 + self._iterations) * 3e-9 * self._x.size**2
 
-    # Its recursion steps regularly.
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
         model, noise = (self._F, self._Q, self._H), (self._alpha, self._beta, self._forget, self._iterations)
-        self._started = vb_akf_kernel(self._x, self._P, *model, *noise, self._started, Z, out)
+        self._started = vb_akf_kernel(self._x, self._P, *model, *noise, self._started, Z, self._clocked(steps), out)

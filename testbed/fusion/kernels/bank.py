@@ -19,6 +19,7 @@ from testbed.fusion.kernels.covariance import (
     INNOVATION,
     INNOVATION_VARIANCE,
     JOSEPH,
+    LOST_VARIANCE,
     NODES,
     RATE,
     SQUARE_ROOT,
@@ -28,8 +29,6 @@ from testbed.fusion.kernels.covariance import (
 # Rows of the output, the first two as in `kernels`; then BANK_ROWS per sensor, the first two as there.
 LEVEL, BANK_HEADER_ROWS = 2, 3
 REFUSED, BANK_ROWS = 2, 3
-# Beyond this [rad^2/s^2] a filter of the bank knows nothing of the rate.
-LOST_VARIANCE = 1.0
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -66,37 +65,59 @@ def predict_bank(x, P, F, nonzero, Q, work, moved, n, M):  # noqa: PLR0912  # pr
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def find_lost(P, lost, n, M, form):  # pragma: no cover
-    """Set which filters have lost the rate in a long gap; return whether one has.
+def recall_bank(x, P, spread, share, g, n, M, form):  # noqa: PLR0912  # pragma: no cover
+    """Do what `recall` does to the rate of each of M filters, beyond LOST_VARIANCE and toward 0.
 
-    They are to stand still: P would outgrow what a reading can reduce in double precision.
+    With D g = P h' / spread, h the row of the rate, the root of what is left is D - (1 - sqrt(LOST_VARIANCE / spread))
+    (D g) h D.
     """
-    some = False
+    beyond = False
     for m in range(M):
-        variance = P[0, 0, m]
+        spread[m] = P[0, 0, m]
         if form == SQUARE_ROOT:
-            variance *= variance
+            spread[m] *= spread[m]
             for k in range(1, n):
-                variance += P[0, k, m] * P[0, k, m]
-        lost[m] = variance > LOST_VARIANCE
-        some = some or lost[m]
-    return some
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def restore(x, P, x_before, P_before, lost, n, M):  # pragma: no cover
-    """Put the filters that are lost back to where they were."""
+                spread[m] += P[0, k, m] * P[0, k, m]
+        beyond = beyond or spread[m] > LOST_VARIANCE
+    if not beyond:
+        return
     for m in range(M):
-        if lost[m]:
-            for i in range(n):
-                x[i, m] = x_before[i, m]
-                for j in range(n):
-                    P[i, j, m] = P_before[i, j, m]
+        share[m] = max(1.0 - LOST_VARIANCE / spread[m], 0.0)
+    for j in range(n):
+        for m in range(M):
+            g[j, m] = P[j, 0, m]
+        if form == SQUARE_ROOT:
+            for m in range(M):
+                g[j, m] *= P[0, 0, m]
+            for k in range(1, n):
+                for m in range(M):
+                    g[j, m] += P[j, k, m] * P[0, k, m]
+        for m in range(M):
+            g[j, m] /= spread[m]
+    if form == SQUARE_ROOT:
+        for m in range(M):
+            spread[m] = 1.0 - np.sqrt(1.0 - share[m])
+        # The row of the rate is what the others still need.
+        for j in range(n - 1, -1, -1):
+            for k in range(n):
+                for m in range(M):
+                    P[j, k, m] -= spread[m] * g[j, m] * P[0, k, m]
+    else:
+        for m in range(M):
+            spread[m] *= share[m]
+        for j in range(n):
+            for k in range(j + 1 if form == JOSEPH else n):
+                for m in range(M):
+                    P[j, k, m] -= spread[m] * g[j, m] * g[k, m]
+    # Likewise.
+    for j in range(n - 1, -1, -1):
+        for m in range(M):
+            x[j, m] -= share[m] * g[j, m] * x[0, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def predict_half(x, P, F, nonzero, Q, shared, work, moved, n, core, M):  # noqa: PLR0912  # pragma: no cover
-    """Do what `predict_bank` does to the lower half of P, none of the filters being lost.
+    """Do what `predict_bank` does to the lower half of P.
 
     From `core` on F is diagonal and the noise the same for all, `shared` (n, n): those states need no sums.
     """
@@ -448,9 +469,8 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
         x, moved, g, K = np.empty((n, M)), np.empty((n, M)), np.empty((n, M)), np.empty((n, M))
         P, Q, work = np.empty((n, n, M)), np.empty((n, n, M)), np.empty((n, 2 * n if form == SQUARE_ROOT else n, M))
         F, H = np.empty((n, n)), np.empty((n_sensor, n))
-        x_before, P_before = np.empty((n, M)), np.empty((n, n, M))
         e, spread, weight, scale, total = np.empty(M), np.empty(M), np.empty(M), np.empty(M), np.empty(M)
-        used, lost = np.empty(n_sensor, dtype=np.bool_), np.empty(M, dtype=np.bool_)
+        used = np.empty(n_sensor, dtype=np.bool_)
         x[:], P[:], Q[:], F[:], H[:] = x_in, P_in, Q_in, F_in, H_in
         common = np.empty((n, n))
         common[:] = shared
@@ -469,17 +489,13 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
                         between_one(common, shared_between, j, s, n)
                         at, part = j, s
                     span = (j + s) / NODES
-                some = find_lost(P, lost, n, M, form)
-                if some:
-                    x_before[:], P_before[:] = x, P
                 if form == SQUARE_ROOT:
                     predict_root_bank(x, P, F, nonzero, Q, work, moved, scale, total, n, M)
                 elif form == JOSEPH:
                     predict_half(x, P, F, nonzero, Q, common, work, moved, n, core, M)
                 else:
                     predict_bank(x, P, F, nonzero, Q, work, moved, n, M)
-                if some:
-                    restore(x, P, x_before, P_before, lost, n, M)
+                recall_bank(x, P, spread, total, g, n, M, form)
             informed, fresh = False, -1
             for i in range(n_sensor):
                 row = BANK_HEADER_ROWS + BANK_ROWS * i

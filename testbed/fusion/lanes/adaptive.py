@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion.lanes.module import module_of
-from testbed.fusion.lanes.pack import Buffers, block_of, by_lane, packs, padded, pattern_of
+from testbed.fusion.lanes.pack import Buffers, block_of, packs, padded, pattern_of
 from testbed.fusion.lanes.source import LANES, MEMORY, adaptive_source
 
 if TYPE_CHECKING:
@@ -36,14 +36,12 @@ class AdaptiveLanes:
     """
 
     def __init__(self, example: SageHusa) -> None:
-        self._model, n, n_sensor = example, len(example._x), len(example._sensors)
+        self._model, n = example, len(example._x)
         source, self._rows = adaptive_source(pattern_of(example))
         self._run = module_of(source).run
         self._half = np.tril_indices(n)
         self._states, self._own = slice(0, n), n + len(self._half[0])
-        one, each = (0, LANES), (n_sensor, 0, LANES)
-        outputs = {"rate": one, "std": one, "innovation": each, "variance": each}
-        self._buffers = Buffers({"Z": (n_sensor, LANES, 0), **outputs})
+        self._buffers = Buffers({"rate": False, "std": False, "innovation": True, "variance": True})
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
         """Advance those filters of `whole` that count alike, and return their estimates by number.
@@ -62,8 +60,8 @@ class AdaptiveLanes:
         due = np.isfinite(received[whole[0]][0])
         alike = [m for m in whole if _alike(filters[m], filters[whole[0]])]
         done: dict[int, EstimateBlock] = {}
-        for pack in packs(alike):
-            done |= self._pack(filters, received, pack, due, self._buffers.of(due))
+        for number, pack in enumerate(packs(alike)):
+            done |= self._pack(filters, received, pack, due, self._buffers.of(due, number))
         return done
 
     def _pack(
@@ -78,20 +76,18 @@ class AdaptiveLanes:
         first, W = filters[pack[0]], np.zeros((len(self._rows), LANES))
         for lane, m in enumerate(lanes):
             self._gather(filters[m], W[:, lane])
-            arrays["Z"][:, lane] = received[m][0]
         windows = np.ascontiguousarray(np.stack([filters[m]._windows for m in lanes], axis=2))
         common, seen = first._sensors.copy(), np.isfinite(first._sensors["previous_reading"]).astype(np.int64)
         matrices = (first._F, first._Q, first._H)
-        outputs = (arrays[name] for name in ("Z", "rate", "std", "innovation", "variance"))
-        self._run(*matrices, W.ravel(), windows, common, seen, due, first._progress[0] > 0.0, *outputs)
+        Z, started = tuple(received[m][0] for m in lanes), first._progress[0] > 0.0
+        self._run(*matrices, W.ravel(), windows, common, seen, due, started, Z, *arrays.values())
         quiet = W[self._rows.index("worst")] <= 1.0
-        found = {name: by_lane(arrays[name]) for name in ("rate", "std", "innovation", "variance")}
         done = {}
         for lane, m in enumerate(pack):
             if quiet[lane]:
                 self._scatter(filters[m], W[:, lane], windows[:, :, lane], common)
                 filters[m]._progress[0] = max(filters[m]._progress[0], float(due.any()))
-                rate, std, innovation, variance = (one[lane] for one in found.values())
+                rate, std, innovation, variance = (found[lane] for found in arrays.values())
                 done[m] = block_of(filters[m], rate, std, innovation, variance, received[m][1])
         return done
 

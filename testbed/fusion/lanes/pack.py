@@ -36,32 +36,40 @@ def padded(pack: Sequence[int]) -> list[int]:
 
 
 def pattern_of(one: ModelFilter) -> Pattern:
-    """Return where the matrices of a filter are not zero."""
+    """Return where the matrices of a filter are not zero, and when it is read."""
     F, H = (tuple(tuple(np.flatnonzero(row).tolist()) for row in matrix) for matrix in (one._F, one._H))
-    return Pattern(F, H)
+    return Pattern(F, H, one.schedule.strides)
 
 
 class Buffers:
-    """Arrays of a block that are used again, NaN where nothing was written.
+    """Arrays of a block for some packs, used again in the next one; NaN where nothing was written.
 
     Parameters
     ----------
-    shapes : mapping of str to tuple of int
-        By name; the time is where the 0 stands.
+    names : mapping of str to bool
+        Which there are, and whether each sensor has one.
     """
 
-    def __init__(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
-        self._shapes, self._due = dict(shapes), np.zeros((0, 0), dtype=np.bool_)
-        self._arrays: dict[str, FloatArray] = {}
+    def __init__(self, names: Mapping[str, bool]) -> None:
+        self._names, self._due = dict(names), np.zeros((0, 0), dtype=np.bool_)
+        self._arrays: list[dict[str, FloatArray]] = []
 
-    def of(self, due: Any) -> dict[str, FloatArray]:
-        """Return the arrays for readings that are `due`, shape (n_sensor, n_time)."""
+    def of(self, due: Any, number: int) -> dict[str, FloatArray]:
+        """Return the arrays of a pack, shape (LANES, n_time) or (LANES, n_sensor, n_time).
+
+        Parameters
+        ----------
+        due : ndarray of bool, shape (n_sensor, n_time)
+            Which readings there are.
+        number : int
+            Of the pack.
+        """
         if not np.array_equal(due, self._due):
-            self._due = due.copy()
-            self._arrays = {
-                name: np.full([size or due.shape[1] for size in shape], np.nan) for name, shape in self._shapes.items()
-            }
-        return self._arrays
+            self._due, self._arrays = due.copy(), []
+        while len(self._arrays) <= number:
+            one, each = (LANES, due.shape[1]), (LANES, *due.shape)
+            self._arrays.append({name: np.full(each if many else one, np.nan) for name, many in self._names.items()})
+        return self._arrays[number]
 
 
 def block_of(
@@ -83,9 +91,3 @@ def block_of(
         shown[f"innovation_{name}"], shown[f"innovation_variance_{name}"] = innovation[i], variance[i]
         shown[f"gated_{name}"] = gated[i]
     return EstimateBlock(rate, std, shown)
-
-
-def by_lane(values: FloatArray) -> FloatArray:
-    """Return an array whose last axis is the lane with that axis first, each lane's values side by side."""
-    moved: FloatArray = np.moveaxis(values, -1, 0).copy()
-    return moved

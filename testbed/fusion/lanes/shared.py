@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.fusion.kernels.covariance import gains_kernel
 from testbed.fusion.lanes.module import module_of
-from testbed.fusion.lanes.pack import Buffers, block_of, by_lane, packs, padded, pattern_of
+from testbed.fusion.lanes.pack import Buffers, block_of, packs, padded, pattern_of
 from testbed.fusion.lanes.source import LANES, shared_source
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class SharedLanes:
         source, self._rows = shared_source(pattern_of(example))
         self._run = module_of(source).run
         self._gains_of = gains_kernel(len(example._x), n_sensor, example.model.n_slow)
-        self._buffers = Buffers({"Z": (n_sensor, LANES, 0), "rate": (0, LANES), "innovation": (n_sensor, 0, LANES)})
+        self._buffers = Buffers({"rate": False, "innovation": True})
         self._gains: _Gains | None = None
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
@@ -56,8 +56,8 @@ class SharedLanes:
         alike = [m for m in whole if _alike(filters[m], first)]
         gains = self._gains_for(first, due)
         done: dict[int, EstimateBlock] = {}
-        for pack in packs(alike):
-            done |= self._pack(filters, received, pack, gains, self._buffers.of(due))
+        for number, pack in enumerate(packs(alike)):
+            done |= self._pack(filters, received, pack, gains, self._buffers.of(due, number))
         return done
 
     def _gains_for(self, first: Kalman, due: Any) -> _Gains:
@@ -74,39 +74,20 @@ class SharedLanes:
         gains: _Gains,
         arrays: dict[str, FloatArray],
     ) -> dict[int, EstimateBlock]:
-        W = np.zeros((len(self._rows), LANES))
-        for lane, m in enumerate(padded(pack)):
-            W[: len(self._model._x), lane] = filters[m]._x
-            arrays["Z"][:, lane] = received[m][0]
-        before = filters[pack[0]]._started
-        self._run(
-            self._model._F,
-            self._model._H,
-            W.ravel(),
-            gains.gains,
-            gains.variance,
-            gains.due,
-            before,
-            arrays["Z"],
-            arrays["rate"],
-            arrays["innovation"],
-        )
+        lanes, W = padded(pack), np.zeros((len(self._rows), LANES))
+        W[: len(self._model._x)] = np.stack([filters[m]._x for m in lanes], axis=1)
+        Z, before = tuple(received[m][0] for m in lanes), filters[pack[0]]._started
+        of_gains = (gains.gains, gains.variance, gains.due)
+        self._run(self._model._F, self._model._H, W.ravel(), *of_gains, before, Z, *arrays.values())
         quiet = W[self._rows.index("worst")] <= 1.0
-        rate, innovation = by_lane(arrays["rate"]), by_lane(arrays["innovation"])
         done = {}
         for lane, m in enumerate(pack):
             if quiet[lane]:
                 one = filters[m]
                 one._x[:], one._P[:] = W[: len(one._x), lane], gains.P
                 one._started = one._started or bool(gains.due.any())
-                done[m] = block_of(
-                    one,
-                    rate[lane],
-                    gains.std,
-                    innovation[lane],
-                    gains.variance.T,
-                    received[m][1],
-                )
+                rate, innovation = (found[lane] for found in arrays.values())
+                done[m] = block_of(one, rate, gains.std, innovation, gains.shown, received[m][1])
         return done
 
 
@@ -120,6 +101,7 @@ class _Gains:
         self.variance, self.std = np.full((n_time, n_sensor), np.nan), np.empty(n_time)
         self.P = one._P.copy()
         kernel(self.P, one._F, one._Q, one._H, one._R, due, one._started, self.gains, self.variance, self.std)
+        self.shown = self.variance.T.copy()
 
     def hold(self, one: Kalman, due: Any) -> bool:
         """Return whether they are those of another filter too."""

@@ -2,8 +2,8 @@
 
 Everything that a lane has stands in one array W (n_row, LANES), one row per number, and the innermost loop runs over
 the lanes. States, covariance and matrices are plain variables in it, zeros of F and H left out: no index to compute, no
-array that could be another one. What comes out is written lane beside lane: single numbers, one to each lane's own
-array, would take as long as all the rest.
+array that could be another one. Readings and estimates, which each lane has in an array of its own, stand lane beside
+lane while they are worked on, a part of the block at a time that stays in the processor's nearest cache.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
 # Lanes of a pack: two vectors of eight. What is left of a pack is padded.
 LANES = 16
@@ -20,29 +20,73 @@ LANES = 16
 GATE = 1000.0
 # What a lane remembers of a sensor, in this order; see `testbed.fusion.kernels.covariance.SENSOR`.
 MEMORY = ("R", "lowest", "highest", "hits", "innovation", "reading", "increment", "window", "band")
-_HEAD = """\
+# Steps that are worked on at a time: a number of each lane takes 32 kB for them.
+PART = 256
+_HEAD = f"""\
 from math import sqrt
 
+import numpy as np
 from numba import njit
 
 
+@njit(cache=True, forceinline=True, error_model="numpy")
+def first_of(due):
+    for k in range(due.size):
+        if due[k]:
+            return k
+    return due.size
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def spread(Z, i, begin, n, first, stride, z):
+    for s in range({LANES}):
+        own = Z[s]
+        for k in range(first, n, stride):
+            z[k, s] = own[i, begin + k]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def collect(part, first, stride, found):
+    for s in range({LANES}):
+        for k in range(first, found.shape[1], stride):
+            found[s, k] = part[k, s]
+
+
 @njit(cache=True, error_model="numpy")
-def run({arguments}):
+def part(%s):
+"""
+_RUN = """
+
+@njit(cache=True, error_model="numpy")
+def run({matrices}, W, {given}, due, started, Z, {found}):
+    one, each = ({PART}, {LANES}), (due.shape[0], {PART}, {LANES})
+    z = np.empty(each)
+{rooms}
+    for s in range({LANES}):
+        {worst} = 0.0
+    for begin in range(0, due.shape[1], {PART}):
+        end = min(begin + {PART}, due.shape[1])
+{spreads}
+        started = part({matrices}, W, {sliced}, due[:, begin:end], started, z, {parts})
+{collects}
 """
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the matrices of a model are not zero.
+    """Where the matrices of a model are not zero, and when it is read.
 
     Parameters
     ----------
     F, H : tuple of tuple of int
         Columns that are not zero, by row.
+    strides : tuple of int
+        Steps between two readings of each sensor.
     """
 
     F: tuple[tuple[int, ...], ...]
     H: tuple[tuple[int, ...], ...]
+    strides: tuple[int, ...]
 
     @property
     def n(self) -> int:
@@ -106,8 +150,9 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
     """Return the source of run(F, H, W, gains, variance, due, started, Z, rate, innovation), and the rows of its W.
 
     States of lanes that share one covariance: `gains` (n_time, n_sensor, n) and `variance` (n_time, n_sensor) belong to
-    the readings that are `due` (n_sensor, n_time). Z is (n_sensor, LANES, n_time), `innovation` (n_sensor, n_time,
-    LANES), `rate` (n_time, LANES). The row ``worst`` holds the largest squared innovation over that of the gate.
+    the readings that are `due` (n_sensor, n_time). Z are LANES arrays (n_sensor, n_time), `innovation` is (LANES,
+    n_sensor, n_time), `rate` (LANES, n_time). The row ``worst`` holds the largest squared innovation over that of the
+    gate.
 
     Parameters
     ----------
@@ -116,11 +161,15 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
     """
     n, rows = pattern.n, Workspace(state_names(pattern.n))
     sensors = range(len(pattern.H))
-    text = _HEAD.format(arguments="F, H, W, gains, variance, due, started, Z, rate, innovation")
-    lines = [*_matrices(pattern), f"    for s in range({LANES}):", f"        {rows.at('worst')} = 0.0"]
-    lines += ["    for k in range(rate.shape[0]):", "        if started:", *_lanes(12, _move(pattern, rows))]
+    text = _HEAD % "F, H, W, gains, variance, due, started, Z, rate, innovation"
+    lines = [
+        *_matrices(pattern),
+        "    for k in range(due.shape[1]):",
+        "        if started:",
+        *_lanes(12, _move(pattern, rows)),
+    ]
     for i in sensors:
-        read = [f"{rows.at(f'z{i}')} = Z[{i}, s, k]"]
+        read = [f"{rows.at(f'z{i}')} = Z[{i}, k, s]"]
         e = [
             *_load(rows, state_names(n)),
             f"e = {rows.at(f'z{i}')}{_seen(pattern, i)}",
@@ -134,8 +183,9 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
         use = [*_load(rows, state_names(n)), f"e = {rows.at(f'z{i}')}{_seen(pattern, i)}"]
         use += [f"{rows.at(f'x{j}')} = x{j} + k{j} * e" for j in range(n)]
         lines += [f"        if due[{i}, k]:", *gains, *_lanes(12, use)]
-    lines += _lanes(8, [f"rate[k, s] = {rows.at('x0')}"])
-    return text + "\n".join(lines) + "\n", rows.names
+    lines += [*_lanes(8, [f"rate[k, s] = {rows.at('x0')}"]), "    return started"]
+    run = _in_parts(pattern, "F, H", {"gains": True, "variance": True}, {"rate": False, "innovation": True}, rows)
+    return text + "\n".join(lines) + run, rows.names
 
 
 def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
@@ -144,8 +194,8 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
 
     The Sage-Husa family with R that adapts, a covariance per lane in Joseph form. `windows` (n_sensor, n_window, LANES)
     holds the squared innovations of the sliding windows, `common` (n_sensor,) one SENSOR record per sensor with what
-    all lanes have in common, `seen` (n_sensor,) how many readings there were. Z is (n_sensor, LANES, n_time),
-    `innovation` and its `variance` are (n_sensor, n_time, LANES), `rate` and `std` (n_time, LANES).
+    all lanes have in common, `seen` (n_sensor,) how many readings there were. Z are LANES arrays (n_sensor, n_time),
+    `innovation` and its `variance` are (LANES, n_sensor, n_time), `rate` and `std` (LANES, n_time).
 
     Parameters
     ----------
@@ -154,19 +204,52 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
     """
     n, n_sensor = pattern.n, len(pattern.H)
     rows = Workspace([*state_names(n), *covariance_names(n), *memory_names(n_sensor)])
-    text = _HEAD.format(
-        arguments="F, Q, H, W, windows, common, seen, due, started, Z, rate, std, innovation, variance",
-    )
+    text = _HEAD % "F, Q, H, W, windows, common, seen, due, started, Z, rate, std, innovation, variance"
     lines = [*_matrices(pattern), *(f"    q{i}_{j} = Q[{i}, {j}]" for i in range(n) for j in range(i + 1))]
-    lines += [f"    for s in range({LANES}):", f"        {rows.at('worst')} = 0.0", "    n_window = windows.shape[1]"]
-    lines += ["    for k in range(rate.shape[0]):", "        if started:"]
+    lines += ["    n_window = windows.shape[1]", "    for k in range(due.shape[1]):", "        if started:"]
     lines += _lanes(12, [*_move(pattern, rows), *_grow(pattern, rows)])
     for i in range(n_sensor):
         lines += [f"        if due[{i}, k]:", "            started = True", *_observe(pattern, rows, i)]
     for i in range(n_sensor):
         lines += [f"        if due[{i}, k]:", *_use(pattern, rows, i)]
     lines += _lanes(8, [f"rate[k, s] = {rows.at('x0')}", f"std[k, s] = sqrt({rows.at(_p(0, 0))})"])
-    return text + "\n".join(lines) + "\n", rows.names
+    found = {"rate": False, "std": False, "innovation": True, "variance": True}
+    run = _in_parts(pattern, "F, Q, H", {"windows": False, "common": False, "seen": False}, found, rows)
+    return text + "\n".join([*lines, "    return started"]) + run, rows.names
+
+
+def _in_parts(
+    pattern: Pattern, matrices: str, given: Mapping[str, bool], found: Mapping[str, bool], rows: Workspace
+) -> str:
+    """Return run, which works on a block part by part; of `given` those that are true begin with the time, of `found`
+    those that are true are there for each sensor.
+    """
+    rooms = [f"    part_{name} = np.empty({'each' if each else 'one'})" for name, each in found.items()]
+    spreads, collects = [], []
+    for i, stride in enumerate(pattern.strides):
+        spreads.append(f"        first{i} = first_of(due[{i}, begin:end])")
+        spreads.append(f"        spread(Z, {i}, begin, end - begin, first{i}, {stride}, z[{i}])")
+    for name, each in found.items():
+        if not each:
+            collects.append(f"        collect(part_{name}, 0, 1, {name}[:, begin:end])")
+            continue
+        collects += [
+            f"        collect(part_{name}[{i}], first{i}, {stride}, {name}[:, {i}, begin:end])"
+            for i, stride in enumerate(pattern.strides)
+        ]
+    return _RUN.format(
+        matrices=matrices,
+        given=", ".join(given),
+        sliced=", ".join(f"{name}[begin:end]" if timed else name for name, timed in given.items()),
+        found=", ".join(found),
+        parts=", ".join(f"part_{name}" for name in found),
+        rooms="\n".join(rooms),
+        spreads="\n".join(spreads),
+        collects="\n".join(collects),
+        worst=rows.at("worst"),
+        PART=PART,
+        LANES=LANES,
+    )
 
 
 def _p(i: int, j: int) -> str:
@@ -240,7 +323,7 @@ def _observe(pattern: Pattern, rows: Workspace, i: int) -> list[str]:
         "floor, clamp = one.floor, one.clamp",
     ]
     lines = [f"            {line}" for line in scalars]
-    lines += _lanes(12, [f"{z} = Z[{i}, s, k]"])
+    lines += _lanes(12, [f"{z} = Z[{i}, k, s]"])
     body = [
         *_load(rows, [*state_names(pattern.n), *covariance_names(pattern.n)]),
         *_project(pattern, i),

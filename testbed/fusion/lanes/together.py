@@ -16,11 +16,11 @@ from testbed.fusion.lanes.adaptive import AdaptiveLanes
 from testbed.fusion.lanes.shared import SharedLanes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from testbed.fusion.base import BlockFilter, EstimateBlock
+    from testbed.fusion.lanes.pack import Received
     from testbed.fusion.model_filter import ModelFilter
-    from testbed.signals import FloatArray
 
 
 class Together:
@@ -42,19 +42,16 @@ class Together:
         elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
             self._lanes = AdaptiveLanes(example)
 
-    def process(
-        self, filters: Sequence[BlockFilter], readings: Sequence[Mapping[str, FloatArray]]
-    ) -> list[EstimateBlock]:
-        """Return what each filter gives for its readings of a block.
+    def process(self, filters: Sequence[BlockFilter], received: Received) -> list[EstimateBlock]:
+        """Return what each filter gives for its readings of a block; it holds until the next one.
 
         Parameters
         ----------
         filters : sequence of BlockFilter
             Some of them; they go on from where they are.
-        readings : sequence of mapping of str to ndarray
-            Of each, by sensor [rad/s].
+        received : sequence of tuple of ndarray
+            Of each what its `BlockFilter.received` returns, or that of another filter with an equal `front`.
         """
-        received = [one.received(values) for one, values in zip(filters, readings, strict=True)]
         done: dict[int, EstimateBlock] = {}
         if self._lanes is not None:
             whole = [m for m, (Z, _, timing) in enumerate(received) if timing is None and not np.isinf(Z).any()]

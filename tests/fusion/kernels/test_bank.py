@@ -1,50 +1,48 @@
-"""The steps of the bank in root form against those of a single filter, and the filters that start again."""
+"""The bank's own steps against the matrix equations."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from testbed.fusion.kernels.bank import innovate_root_bank, predict_root_bank, start_again, update_root_bank
-from testbed.fusion.kernels.covariance import gain_root, predict_root, update_root
-from testbed.signals import random_stream
+from testbed.fusion.filters.wideband import _columns
+from testbed.fusion.kernels.bank import bank_kernel
+from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, LOST_VARIANCE, SQUARE_ROOT
+from testbed.fusion.model import covariance_root
+from testbed.fusion.transitions import even
 
 
 @pytest.mark.oracle
-def test_root_steps_of_the_bank_are_those_of_one_filter() -> None:
-    rng, n, M, R = random_stream(9, "bank"), 4, 3, 0.3
-    F, h, z = rng.standard_normal((n, n)), rng.standard_normal(n), 0.7
-    F[0, 2], h[1] = 0.0, 0.0
-    x, D, S = rng.standard_normal((n, M)), rng.standard_normal((n, n, M)), rng.standard_normal((n, n, M))
-    S = S * np.tri(n)[:, :, None]
-    # A filter that starts certain, and does not lose it: rows of zeros.
-    D[:, :, 2] = S[:, :, 2] = 0.0
-    D *= 0.1
-    ones = [(x[:, m].copy(), D[:, :, m].copy(), np.ascontiguousarray(S[:, :, m])) for m in range(M)]
-    nonzero, seen = np.zeros((n, n + 1), np.int64), np.zeros(n + 1, np.int64)
-    for row, values in zip((*nonzero, seen), (*F, h), strict=True):
-        (at,) = np.nonzero(values)
-        row[: at.size], row[-1] = at, at.size
-    total, spread, e, g = np.empty(M), np.empty(M), np.empty(M), np.empty((n, M))
-    predict_root_bank(x, D, F, nonzero, S, np.empty((n, 2 * n, M)), np.empty((n, M)), np.empty(M), total, n, M)
-    innovate_root_bank(x, D, h, seen, z, e, spread, g, n, M)
-    update_root_bank(x, D, R, e, spread, g, total, n, M)
-    for m, (x_one, D_one, S_one) in enumerate(ones):
-        predict_root(x_one, D_one, F, S_one, np.empty((n, 2 * n)), np.empty(n), n)
-        error, due, G, K = np.array([z - h @ x_one]), np.array([True]), np.empty((1, n)), np.empty((n, 1))
-        assert e[m] == pytest.approx(error[0], abs=1e-14)
-        assert spread[m] == pytest.approx(float(h @ D_one @ D_one.T @ h), abs=1e-14)
-        gain_root(x_one, D_one, h[None], error, np.array([R]), due, G, np.empty((1, 1)), K, n, 1)
-        update_root(D_one, G, K, np.array([R]), due, n, 1)
-        np.testing.assert_allclose(x[:, m], x_one, rtol=0, atol=1e-13)
-        np.testing.assert_allclose(D[:, :, m] @ D[:, :, m].T, D_one @ D_one.T, rtol=0, atol=1e-13)
+@pytest.mark.parametrize("form", [JOSEPH, CONVENTIONAL, SQUARE_ROOT])
+def test_a_rate_that_is_lost_goes_back_as_if_read_at_zero(form: int) -> None:
+    """In each filter of the bank for itself, as in a single one: the Kalman update with z = 0 and R = V P / (P - V)."""
+    n, steps, F, H = 2, 5, np.array([[1.0, 0.5], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    noises = [np.diag([0.1, 0.2]), np.diag([1e-3, 1e-3])]
+    start_P, start_x = np.array([[0.3, 0.1], [0.1, 0.1]]), np.array([0.3, 2.0])
 
+    expected = []
+    for Q in noises:
+        x, P, lost = start_x.copy(), start_P.copy(), 0
+        for _ in range(steps):
+            x, P = F @ x, F @ P @ F.T + Q
+            spread = P[0, 0]
+            if spread > LOST_VARIANCE:
+                lost += 1
+                K = P[:, :1] / (spread + LOST_VARIANCE * spread / (spread - LOST_VARIANCE))
+                x, P = x - K[:, 0] * x[0], P - K @ (H @ P)
+        expected.append((x, P, lost))
+    # The fast one sooner: each by its own variance.
+    assert expected[0][2] > expected[1][2] > 0
 
-def test_only_slower_and_far_less_likely_filters_start_again() -> None:
-    n, M = 2, 4
-    x, P = np.arange(8.0).reshape(n, M), np.arange(16.0).reshape(n, n, M)
-    before = x.copy(), P.copy()
-    start_again(x, P, np.array([-30.0, -19.0, 0.0, -50.0]), 20.0, n, M)
-    for now, old in zip((x, P), before, strict=True):
-        assert np.array_equal(now[..., 0], old[..., 2])
-        assert np.array_equal(now[..., 1:], old[..., 1:])
+    carry = covariance_root if form == SQUARE_ROOT else np.copy
+    x, P = np.repeat(start_x[:, None], 2, axis=1), np.repeat(carry(start_P)[:, :, None], 2, axis=2)
+    Q = np.ascontiguousarray(np.stack([carry(one) for one in noises], axis=2))
+    mixing = np.zeros(2), np.zeros((1, 2)), np.array([1.0, 0.9, 10.0, 10.0, 20.0]), np.zeros(2)
+    clocked, Z, out = even(F, Q, noises[0]), np.full((1, steps), np.nan), np.empty((6, steps))
+    matrices = F, _columns(F), Q, noises[0], H, _columns(H), np.array([1.0])
+    bank_kernel(n, 1, 2, form)(x, P, *matrices, Z, clocked, *mixing, out)
+    for m, (state, covariance, _) in enumerate(expected):
+        left = P[:, :, m]
+        left = left @ left.T if form == SQUARE_ROOT else np.tril(left) + np.tril(left, -1).T
+        np.testing.assert_allclose(left, covariance, rtol=1e-12)
+        np.testing.assert_allclose(x[:, m], state, rtol=1e-12)
