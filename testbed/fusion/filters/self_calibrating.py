@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
+from testbed.errors import quoted, shortened
 from testbed.fusion.analysis.calibration import Calibrated, Calibration
 from testbed.fusion.analysis.indicator import FrequencyRows
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
@@ -38,6 +39,7 @@ _LEAST_LAG = 1e-6
 # From this change of gain [-] and lag [s] on, and from this share of their standard deviations on, the last seconds, as
 # many at the most, are filtered again: less is no news, and each time costs as much as these seconds did.
 _GAIN_CHANGE, _LAG_CHANGE, _NEWS, _AGAIN = 5e-4, 2e-5, 0.5, 10
+_MOST_FINDINGS = 5
 _OWN = ("gain", "gain_std", "delay", "delay_std")
 
 
@@ -90,12 +92,13 @@ class SelfCalibratingParameters(CommonParameters):
     def _check_filter(cls, value: dict[str, dict[str, Any]], info: ValidationInfo) -> dict[str, dict[str, Any]]:
         ((name, given),) = value.items()
         if name not in _INNER:
-            msg = f"expected one of {list(_INNER)}, which can go on with another belief, got {name!r}"
+            msg = f"expected one of {list(_INNER)}, which can go on with another belief, got {quoted(name)}"
             raise ValueError(msg)
         try:
             inner = _inner_class(name).Parameters.model_validate(given, context=info.context)
         except ValidationError as error:
-            msg = "; ".join(f"{name}.{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+            found = [f"{name}.{shortened('.'.join(map(str, one['loc'])))}: {one['msg']}" for one in error.errors()]
+            msg = "; ".join(found[:_MOST_FINDINGS])
             raise ValueError(msg) from error
         if isinstance(inner, FilterParameters) and inner.order == 1:
             msg = f"{name}: expected order 2 or 3, since one of order 1 cannot extrapolate over a delay"
