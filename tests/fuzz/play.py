@@ -246,6 +246,7 @@ def play(kind, text, path, seconds=4 * MOST_SECONDS):
             redirect_stdout(io.StringIO()),
             redirect_stderr(io.StringIO()),
             python_warnings.catch_warnings(),
+            np.errstate(all="warn"),  # as users have it; the tests raise
         ):
             python_warnings.simplefilter("ignore")
             PLAYED[kind](path)
