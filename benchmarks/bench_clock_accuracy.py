@@ -14,7 +14,7 @@ from promises import Promise, conclude
 
 from testbed import Scenario, evaluate
 
-FILTERS = ("kalman", "arw_shakf", "wideband")
+FILTERS = ("kalman", "arw_shakf", "wideband", "complementary", "blending", "imm", "vb_akf")
 # Rates of the MHD ARS, of the gyro, and of the gyro in a whole ratio [Hz].
 PAIRS = [(20_000, 2003.704, 2000.0), (20_000, 6664.0, 5000.0), (1000, 400.0, 500.0)]
 

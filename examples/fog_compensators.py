@@ -28,7 +28,7 @@ from testbed.compensation.training import block_means, gather
 from testbed.drift.leak import find_leaks
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset
-from testbed.sensors.base import Surroundings
+from testbed.sensors.stages import Surroundings
 from testbed.units import DEG_H
 
 if TYPE_CHECKING:

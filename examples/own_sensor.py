@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from testbed.sensors.base import Decimator, Sensor, rate_ratio
+from testbed.sensors.base import Sensor
+from testbed.sensors.decimation import Decimator, rate_ratio
 from testbed.signals import LinearFilter, random_stream, transfer
 from testbed.units import Frequency, Range, RateDensity
 

@@ -20,6 +20,8 @@ ComplexArray = NDArray[np.complex128]
 BASE_RATE_HZ = 20_000.0
 # Samples worked on at a time: a second of the base clock.
 BLOCK = 20_000
+# Median of the magnitude of a normal variable over its standard deviation.
+NORMAL_MEDIAN = 0.6744897501960817
 
 
 def sample_times(start: int, n_time: int, sample_rate_hz: float) -> FloatArray:

@@ -26,8 +26,10 @@ def evaluate(
     seeds: Iterable[int],
     settings: Iterable[Mapping[str, Any]] | None = None,
 ) -> list[Any]:
-    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9.
+    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9,
+    but for the profiles of a fluid, which a run keeps for its report.
 
+    Only `profiles`, the fluid over the height of a channel that a report draws, belong to a run alone.
     Nothing is written and no signal is kept: memory grows neither with the duration nor with the number of seeds, but
     for the metrics themselves. Motion and table are played once for all seeds and settings that share them, and so are
     what a sensor reads without noise, the floors and the optimum. Scenarios with a random motion or floor need a

@@ -10,16 +10,16 @@ from testbed.chain.onset import Onset, joined, longest
 from testbed.fusion import FILTERS
 from testbed.fusion.lanes.together import Together
 from testbed.sensors import SENSORS
-from testbed.sensors.base import ExposedStage, SplitStage, Surroundings
 from testbed.sensors.checked import CheckedSensor
+from testbed.sensors.stages import ExposedStage, SplitStage, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from testbed.fusion.base import EstimateBlock, Received
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
-    from testbed.sensors.base import SensorStage
+    from testbed.sensors.stages import SensorStage
     from testbed.signals import FloatArray
 
 

@@ -15,17 +15,17 @@ from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError
 from testbed.runs.block import POSE_STRIDE, RunBlock
 from testbed.sensors import SENSORS
-from testbed.sensors.base import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 from testbed.sensors.checked import CheckedSensor
+from testbed.sensors.stages import ExposedStage, ProfiledStage, Surroundings, ThermalStage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from testbed.fusion import EstimateBlock
     from testbed.models.motion import CommandBlock
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import FilterSpec, Scenario
-    from testbed.sensors.base import SensorStage
+    from testbed.sensors.stages import SensorStage
     from testbed.signals import FloatArray
 
     WatchedFilter = CheckedFilter | LateFilter

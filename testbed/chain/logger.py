@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 

@@ -10,7 +10,7 @@ from testbed.scenario.step_choice import choose_step, exposed
 
 if TYPE_CHECKING:
     from testbed.models.motion import CommandBlock
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
 
 

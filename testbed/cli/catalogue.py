@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from testbed.cli.console import terminal
+from testbed.compensation import LITERATURE
 from testbed.compensation.model_only import METHODS
 from testbed.fusion import FILTERS
 from testbed.inputs.plugins import Plugins, load_plugins, offered
@@ -48,6 +49,7 @@ def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
         "band_sets": _heads("testbed.fusion", "bands"),
         "pointing": {name: _summary(part) for name, part in POINTING.items()},
         "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
+        "drift_methods": {name: _summary(resolve("method", name, LITERATURE)) for name in LITERATURE},
         "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
     }
 

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 from testbed.chain.runner import run
 from testbed.cli.terminal import print_metrics
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted
 
 if TYPE_CHECKING:
     from testbed.campaigns.study import Study
     from testbed.cli.options import Output
+
+# More is no seed.
+_MOST_DIGITS = 20
 
 
 def repeat(study: Study, only: str, out: Path | None, output: Output) -> None:
@@ -34,9 +37,10 @@ def repeat(study: Study, only: str, out: Path | None, output: Output) -> None:
         If there is no such case.
     """
     number, _, seed = only.partition(":")
-    if not (number.isdecimal() and seed.isdecimal() and int(number) < len(study.cases)):
+    whole = all(part.isdecimal() and len(part) <= _MOST_DIGITS for part in (number, seed))
+    if not (whole and int(number) < len(study.cases)):
         last = len(study.cases) - 1
-        msg = f"expected CASE:SEED, the case from 0 to {last}, such as {last}:{study.seeds[0]}, got {only!r}"
+        msg = f"expected CASE:SEED, the case from 0 to {last}, such as {last}:{study.seeds[0]}, got {quoted(only)}"
         raise ScenarioError([Problem(msg, "--only")])
     case = study.cases[int(number)]
     target = out or Path("runs") / f"{study.name}_case{case.number}_seed{int(seed)}"

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.signals import NORMAL_MEDIAN
+
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 # The wavelet of Cohen, Daubechies and Feauveau with five and three taps: one step of prediction and one of update.
 WAVELET = "bior2.2"
-# Median of the magnitude of a normal variable over its standard deviation.
-_MEDIAN = 0.6744897501960817
 
 
 def lifting_threshold(signal: FloatArray) -> FloatArray:
@@ -43,7 +43,8 @@ def lifting_threshold(signal: FloatArray) -> FloatArray:
 
     coarse, *details = pywt.wavedec(signal, WAVELET)
     kept = [
-        pywt.threshold(d, np.median(np.abs(d)) / _MEDIAN * np.sqrt(2.0 * np.log(signal.size)), "soft") for d in details
+        pywt.threshold(d, np.median(np.abs(d)) / NORMAL_MEDIAN * np.sqrt(2.0 * np.log(signal.size)), "soft")
+        for d in details
     ]
     rebuilt: FloatArray = pywt.waverec([coarse, *kept], WAVELET)[: signal.size]
     return rebuilt

@@ -25,6 +25,12 @@ _WHAT = "requirement (name, duration, motion, sensors, fusion, trackers, mirrors
 _WINDOWED = ("rpe_urad", "mpe_urad")
 _ASKED = (*_WINDOWED, "residual_rms_urad")
 _COST = "cost"
+# Keys of a scenario that a requirement has not, and what is there instead.
+_ELSEWHERE = {
+    "pointing": "is chosen: 'trackers:' and 'mirrors:' have the parts, the bounds the windows",
+    "expect": "is what is asked: give bounds beside 'motion:', such as rpe_urad: {100 ms: '< 0.5'}",
+    "turntable": "is ideal here: leave it out, and give the chosen scenario another",
+}
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,9 @@ def read_requirement(path: str | Path, *, plugins: Iterable[str] = ()) -> Requir
     tree = read_yaml(Path(path), "a requirement")
     document = Document(path, _WHAT, tree)
     data = dict(document.data)
+    for key in _ELSEWHERE.keys() & data.keys():
+        document.find((key,), _ELSEWHERE[key])
+        del data[key]
     bounds = _bounds(document, {key: data.pop(key) for key in _ASKED if key in data})
     costs: dict[tuple[str, str], float] = {}
     written = {
@@ -87,12 +96,29 @@ def read_requirement(path: str | Path, *, plugins: Iterable[str] = ()) -> Requir
     folder = Path(path).resolve().parent
     trackers = _parts(document, Tracker, "trackers", written["trackers"], folder)
     mirrors = _parts(document, Mirror, "mirrors", written["mirrors"], folder)
+    for name, tracker in trackers.items():
+        if tracker.fades:
+            words = "expected none: a spectrum knows no moments; give them to the chosen scenario"
+            document.find(("trackers", name, "fades"), words)
     document.refuse()
     written["frame"] = {"turntable": {"mode": "ideal"}, **data}
     whole = {**written["frame"], "sensors": written["sensors"], "fusion": written["fusion"]}
     inner = Document(path, _WHAT, Tree(whole, tree.lines))
     scenario = read_document(Intake(inner, folder, load_plugins(plugins)))
-    return Requirement(scenario, trackers, mirrors, bounds, costs, written)
+    found = Requirement(scenario, trackers, mirrors, bounds, costs, written)
+    _check_windows(found, document)
+    document.refuse()
+    return found
+
+
+def _check_windows(found: Requirement, document: Document) -> None:
+    """Note windows that do not fit into what is judged, at the bound that asks for them."""
+    frame = found.scenario.frame
+    judged = frame.duration - frame.settle
+    for bound in found.bounds:
+        metric, _, length = bound.metric.partition(".")
+        if length and float(length) > judged:
+            document.find((metric,), f"expected windows within the {judged:g} s after settle, got {float(length):g} s")
 
 
 def _bounds(document: Document, asked: Mapping[str, Any]) -> tuple[Bound, ...]:
@@ -102,7 +128,10 @@ def _bounds(document: Document, asked: Mapping[str, Any]) -> tuple[Bound, ...]:
         for window, text in windows.items():
             place = (metric, window) if window else (metric,)
             try:
-                found.append(read_bound("", _named(metric, str(window)), text))
+                bound = read_bound("", _named(metric, str(window)), text)
+                if not bound.relation.startswith("<"):
+                    document.find(place, f"expected an upper bound such as '< 0.5', got {quoted(text)}")
+                found.append(bound)
             except ValueError as error:
                 document.find(place, str(error) or f"expected a bound such as '< 0.5', got {quoted(text)}")
     if not asked:

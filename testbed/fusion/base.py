@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from testbed.fusion.analysis.finding import Finding
+    from testbed.fusion.analysis.indicator import FrequencyRows
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
@@ -43,6 +44,7 @@ _UNITS = {
     "N": "rad^2/s^2",
     "Q_rate": "rad^2/s^2",
     "delay": "s",
+    "frequency": "Hz",
 }
 
 
@@ -65,8 +67,9 @@ class EstimateBlock:
         are those of (11), before any sensor of that instant is used, and their variance is H P_prior H' + R of (33).
         R_<sensor> is the value in force for that reading, before the factor S_<sensor> of (36). N_<sensor> is N_k / dT
         of (30) [rad^2/s^2]; band_<sensor> 0 low, 1 mid, 2 high; Q_rate the variance that a step adds to the rate;
-        guard_hits counts how often a bound held R or Q so far. Of readings with stamps, what belongs to one of another
-        sensor stands at the next stamp of the fastest one, and late_<sensor> counts those that came too late so far.
+        guard_hits counts how often a bound held R or Q so far; frequency_<sensor> [Hz] is what `FrequencyRows` reads
+        off that sensor. Of readings with stamps, what belongs to one of another sensor stands at the next stamp of the
+        fastest one, and late_<sensor> counts those that came too late so far.
     time_ns : ndarray of int, shape (n_time,), optional
         Stamps of the fastest sensor [ns], of readings that have some; those that came too late are left out.
     findings : tuple of Finding, optional
@@ -171,6 +174,8 @@ class BlockFilter:
     """Ranges of ``nees`` and ``nis_<sensor>`` where its own model is the truth, if it is not consistent even then."""
     dishonest: ClassVar[str] = ""
     """Why the claimed standard deviation is not the error's, if it is not."""
+    frequency: FrequencyRows | None = None
+    """What its runs show of the frequency of the signal, beside what it estimates; nothing unless it says so."""
 
     def __init__(
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: Part

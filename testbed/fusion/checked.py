@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from testbed.fusion.analysis.indicator import FrequencyRows
     from testbed.signals import FloatArray
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
@@ -42,6 +44,7 @@ class CheckedFilter:
         self._name, self._inner, self._rate_hz, self._shipped = name, inner, sample_rate_hz, shipped
         self._block, self._sample = 0, 0
         self._diagnostics: tuple[str, ...] | None = None
+        self._frequency: FrequencyRows | None = inner.frequency if shipped else None
 
     def process(
         self, readings: Mapping[str, ArrayLike], time_ns: Mapping[str, ArrayLike] | None = None
@@ -69,12 +72,15 @@ class CheckedFilter:
             self.check_clocks()
             views.append({name: _read_only(values) for name, values in time_ns.items()})
         estimate = self._inner.process(*views) if self._shipped else self._foreign(views)
+        rows: dict[str, FloatArray] = {}
         if not (time_ns is None and self._even()):
             n_time = -1 if estimate.time_ns is None else estimate.time_ns.size
+        elif self._frequency is not None:
+            rows = self._frequency.process(views[0], n_time)
         self._check_shapes(estimate, n_time)
         checked = estimate if self._shipped else self._checked(estimate)
         self._sample += n_time
-        return checked
+        return _beside(checked, rows)
 
     def check_clocks(self) -> None:
         """Raise ValueError if the filter takes no readings with stamps or of odd rates."""
@@ -98,8 +104,9 @@ class CheckedFilter:
         if not self._shipped:
             return self.process(readings, time_ns)
         timed = not (time_ns is None and self._even())
-        blank: EstimateBlock = self._inner.blank(max(values.size for values in readings.values()), timed=timed)
-        return blank
+        n_time = max(values.size for values in readings.values())
+        rows = {} if timed or self._frequency is None else self._frequency.blank(n_time)
+        return _beside(self._inner.blank(n_time, timed=timed), rows)
 
     def _even(self) -> bool:
         """Return whether readings without stamps come at regular steps, one estimate for each of the fastest sensor."""
@@ -164,6 +171,10 @@ class CheckedFilter:
         at = self._sample / self._rate_hz
         msg = f"filter {self._name}, block {self._block} (from t = {at:g} s): {what}"
         raise RunError(msg) from cause
+
+
+def _beside(estimate: EstimateBlock, rows: dict[str, FloatArray]) -> EstimateBlock:
+    return replace(estimate, diagnostics=estimate.diagnostics | rows) if rows else estimate
 
 
 def _read_only(values: ArrayLike) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from testbed.identification.spectrum import Series
 from testbed.logs.channel import unwound
+from testbed.logs.clock import NANO
 from testbed.logs.inspection import remarks
 from testbed.logs.options import refusal
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from testbed.logs.channel import LogChannel
     from testbed.signals import FloatArray
 
-_NANO = 1e-9
 # Of the samples: more lost ones would be bridges of what was not measured.
 _MOST_LOST = 0.01
 
@@ -66,7 +66,7 @@ def series_of(channel: LogChannel, reference: LogChannel) -> Prepared:
         notes.append(f"{channel.name}: {lost} of {values.size} samples are missing, bridged by straight lines")
     start = 0.0
     if channel.stamps_ns is not None and reference.stamps_ns is not None:
-        start = _NANO * float(channel.stamps_ns[0] - reference.stamps_ns[0])
+        start = NANO * float(channel.stamps_ns[0] - reference.stamps_ns[0])
     elif channel is not reference:
         notes.append(f"{channel.name}: without stamps, its first sample is taken to be at the reference's first")
     if kind == "rate":

@@ -41,6 +41,8 @@ class LocalFit:
         Degrees of freedom of the noise's estimate, complex ones.
     noise, power : float
         Mean |N|^2, and mean |Y|^2 less the transients, over the bins.
+    noise_hz : float
+        Where a noise of density 1/f, averaged as this one is, has its mean [Hz].
     curvature, pull : float
         Sums of |dY/de|^2 and of Re((dY/de)* Y) that the model leaves, over the noise [-].
     spread : float
@@ -62,6 +64,7 @@ class LocalFit:
     freedom: int
     noise: float
     power: float
+    noise_hz: float
     curvature: float
     pull: float
     spread: float
@@ -108,6 +111,8 @@ def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexA
     freedom = freq.size - powers.shape[1] - s.size
     explained, unexplained = (float(np.vdot(one, one).real) for one in (onto[0], left[0]))
     noise = unexplained / freedom
+    # What the residual of each bin has of the noise there.
+    share = 1.0 - np.sum(smooth**2, axis=1) - np.sum(np.abs(U) ** 2, axis=1)
     ratio = explained / s.size / noise if noise > 0.0 else np.inf
     return LocalFit(
         freq_hz=middle,
@@ -117,6 +122,7 @@ def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexA
         freedom=freedom,
         noise=noise,
         power=(explained + unexplained) / (freq.size - powers.shape[1]),
+        noise_hz=float(share.sum() / (share @ (1.0 / freq))),
         curvature=float(np.vdot(left[1], left[1]).real) / noise if noise > 0.0 else 0.0,
         pull=float(np.vdot(left[1], left[0]).real) / noise if noise > 0.0 else 0.0,
         spread=float(np.linalg.norm(left[1]) / (2.0 * np.pi * middle * max(float(np.linalg.norm(Y)), 1e-300))),

@@ -10,7 +10,7 @@ import numpy as np
 from testbed.identification.alignment import MOST_APART, rough_clock, rough_lag
 from testbed.identification.local import LocalFit, fit_local
 from testbed.identification.spectrum import RecordGrid, Series, spectrum
-from testbed.identification.windows import spectrum_parts
+from testbed.identification.windows import quiet_parts, spectrum_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,14 +55,15 @@ class Matched:
         Of the output.
     lag : float
         Delay that was taken off before the fits [s].
-    fits : list of LocalFit
-        In the order of frequency.
+    fits, quiet : list of LocalFit
+        In the order of frequency; those of the parts where the reference has nothing of its own tell the noise alone.
     """
 
     grid: RecordGrid
     clock: OutputClock
     lag: float
     fits: list[LocalFit]
+    quiet: list[LocalFit]
 
     @property
     def misfit(self) -> float:
@@ -114,7 +115,7 @@ def _matched(reference: Series, output: Series, clock: OutputClock, *, staged: b
         before, clock = clock, work.improved(clock, work.parts)
         if not abs(clock.error - before.error) > _SETTLED * clock.std:
             break
-    return Matched(grid, clock, lag, work.fits(clock, work.parts))
+    return Matched(grid, clock, lag, *work.settled(clock))
 
 
 @dataclass(frozen=True)
@@ -125,16 +126,24 @@ class _Work:
     parts: list[SpectrumPart]
     back: ComplexArray
 
-    def fits(self, clock: OutputClock, parts: Sequence[SpectrumPart]) -> list[LocalFit]:
-        Y, Z = (self.back * one for one in spectrum(self.output, self.grid, clock.error))
-        freq = self.grid.freq_hz
-        return [fit_local(part, freq, self.X, Y, Z) for part in parts]
+    def transformed(self, clock: OutputClock) -> tuple[ComplexArray, ComplexArray]:
+        Y, Z = spectrum(self.output, self.grid, clock.error)
+        return self.back * Y, self.back * Z
+
+    def settled(self, clock: OutputClock) -> tuple[list[LocalFit], list[LocalFit]]:
+        """Return the fits, and those of the parts between them."""
+        freq, X, (Y, Z) = self.grid.freq_hz, self.X, self.transformed(clock)
+        fits = [fit_local(part, freq, X, Y, Z) for part in self.parts]
+        between = quiet_parts(self.parts, np.abs(X) ** 2, np.abs(Y) ** 2)
+        return fits, [fit_local(part, freq, X, Y, Z) for part in between]
 
     def improved(self, clock: OutputClock, parts: Sequence[SpectrumPart]) -> OutputClock:
         """Return the clock after one step."""
         if clock.std == 0.0 or not parts:
             return clock
-        told = [one for one in self.fits(clock, parts) if one.spread > _SPREAD * self.grid.length]
+        Y, Z = self.transformed(clock)
+        fits = [fit_local(part, self.grid.freq_hz, self.X, Y, Z) for part in parts]
+        told = [one for one in fits if one.spread > _SPREAD * self.grid.length]
         curvature = sum(one.curvature for one in told)
         if not curvature > 0.0:
             return OutputClock(clock.error, np.inf)

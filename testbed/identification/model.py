@@ -24,6 +24,8 @@ _FALLS = 0.5
 _UNSURE = 0.1
 # And the least that it turns there to be one [rad].
 _NEGLIGIBLE = 1e-3
+# Standard deviations from which on a value is no chance.
+_SURE = 4.0
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,17 @@ def _dynamic(found: FrequencyResponse, n_pole: int, delay: float) -> Iterator[Se
                 weight=weight,
                 delay=start,
             )
-            yield _judged(found, fit.numerator, fit.denominator, fit.delay, blind=blind, delayed=start is not None)
+            model = _judged(found, fit.numerator, fit.denominator, fit.delay, blind=blind, delayed=start is not None)
+            if blind or not may_be_blind or _sees_constant(model):
+                yield model
+
+
+def _sees_constant(model: SensorModel) -> bool:
+    """Return whether the constant term of the numerator is more than chance: what sees a constant rate is another
+    sensor, to filters and to the noise fitted to it, however little it sees.
+    """
+    place = model.free - 1
+    return bool(abs(model.numerator[place]) > _SURE * np.sqrt(model.covariance[place, place]))
 
 
 def _judged(

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 # An output noise this much below the input noise keeps R positive and changes nothing.
 _LEAST_OUTPUT = 3e-4
+_ROUNDS = 50
 
 
 class Heard(NamedTuple):
@@ -81,7 +82,7 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
         levels.append([of_reference, *(one.noise - abs(one.response) ** 2 * of_reference for one in (a, b))])
         evidence.append(of_reference * abs(gains) / np.sqrt(a.noise * b.noise / (2.0 * a.freedom)))
     middle, freedom = (
-        np.array([getattr(one, name) for one in both[0]], dtype=float) for name in ("freq_hz", "freedom")
+        np.array([getattr(one, name) for one in both[0]], dtype=float) for name in ("noise_hz", "freedom")
     )
     own, a_floor, b_floor = (NoiseFloor(middle, row / grid.length, freedom) for row in np.array(levels).T)
     return ThreeFloors(own, a_floor, b_floor, float(np.sum(evidence) / np.sqrt(len(evidence))))
@@ -109,7 +110,9 @@ def fit_noise(floor: NoiseFloor, gain: FloatArray, *, slow_before: bool) -> Nois
 
     .. math:: S(f) = |G|^2 a + b + c / f, \quad a, b, c \ge 0
 
-    by non-negative least squares of relative errors, weighted by the degrees of freedom.
+    by maximum likelihood, each density a sum of squares of its degrees of freedom, :math:`\max -\sum_k \nu_k (D_k / S_k
+    + \ln S_k)`: non-negative least squares of :math:`(D_k - S_k) / S_k` with the last S below the line until it
+    settles. With D below it a value that is low by chance would count for more.
 
     Parameters
     ----------
@@ -120,19 +123,29 @@ def fit_noise(floor: NoiseFloor, gain: FloatArray, *, slow_before: bool) -> Nois
     slow_before : bool
         Whether the 1/f noise passes the dynamics, as a bias does: |G|^2 c / f.
     """
-    from scipy.optimize import nnls
-
     known = floor.density > 0.0
     freq, density, power = floor.freq_hz[known], floor.density[known], gain[known] ** 2
     terms = np.stack([power, np.ones(density.size), (power if slow_before else 1.0) / freq], axis=1)
-    weight = np.sqrt(floor.freedom[known])
-    rows = terms / density[:, None] * weight[:, None]
-    size = np.linalg.norm(rows, axis=0)
-    level, _ = nnls(rows / size, weight)
-    a, b, c = level / size
+    a, b, c = _likeliest(terms, density, floor.freedom[known])
     if slow_before:
         outer = max(float(np.sqrt(b)), _LEAST_OUTPUT * float(np.sqrt(max(a, c / float(freq.max())))))
         return NoiseFit(float(np.sqrt(a)), outer, None, float(np.sqrt(2.0 * np.pi * c)))
     # A knee stands on white noise; without any that is put where the band ends.
     outer = max(float(np.sqrt(b if b > 0.0 else c / float(freq.max()))), _LEAST_OUTPUT * float(np.sqrt(a)))
     return NoiseFit(float(np.sqrt(a)), outer, float(c / outer**2) if c > 0.0 else None, 0.0)
+
+
+def _likeliest(terms: FloatArray, density: FloatArray, freedom: FloatArray) -> FloatArray:
+    """Return the levels of the terms, shape (n_term,), none below zero, that make densities the likeliest."""
+    from scipy.optimize import nnls
+
+    believed, level = density, np.zeros(terms.shape[1])
+    for _ in range(_ROUNDS):
+        weight = np.sqrt(freedom) / believed
+        rows = terms * weight[:, None]
+        size = np.linalg.norm(rows, axis=0)
+        before, level = level, nnls(rows / size, weight * density)[0] / size
+        believed = terms @ level
+        if np.allclose(level, before, rtol=1e-6, atol=0.0):
+            break
+    return level

@@ -161,13 +161,11 @@ def _response(used: list[LocalFit], found: Matched) -> FrequencyResponse:
 
 
 def _floor(found: Matched, limit: float) -> NoiseFloor:
-    """Return the noise: what does not follow, or all where nothing does."""
-    level = [one.noise if one.chance < limit else one.power for one in found.fits]
-    return NoiseFloor(
-        np.array([one.freq_hz for one in found.fits]),
-        np.array(level) / found.grid.length,
-        np.array([one.freedom for one in found.fits], dtype=float),
-    )
+    """Return the noise: what does not follow, all where nothing does, and what there is between the parts."""
+    levels = [(one.noise_hz, one.noise if one.chance < limit else one.power, one.freedom) for one in found.fits]
+    levels += [(one.noise_hz, one.noise, one.freedom) for one in found.quiet]
+    freq, level, freedom = np.array(sorted(levels), dtype=float).reshape(-1, 3).T
+    return NoiseFloor(freq, level / found.grid.length, freedom)
 
 
 # Lines off the mains' frequencies from which on those at them are excitation too; how far the mains wander.

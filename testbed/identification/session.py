@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from testbed.identification.channels import of_one_clock, series_of
 from testbed.identification.model import SensorModel, fit_model
@@ -161,7 +162,13 @@ def _identified(
     model = fit_model(measured.response)
     sees_constant = bool(model.numerator[-1] != 0.0)
     noise = fit_noise(floor, np.abs(model.response(floor.freq_hz)), slow_before=sees_constant)
-    belief = _belief(channel, model, noise, _bias(prepared, inner, model, measured))
+    try:
+        belief = _belief(channel, model, noise, _bias(prepared, inner, model, measured))
+    except ValidationError as error:
+        found = error.errors()[0]
+        key = ".".join(map(str, found["loc"])) or "response"
+        words = f"its readings make no belief, {key}: {found['msg']}; a reading may be damaged"
+        raise refusal_of(channel, channel, words) from error
     notes = (*inner.notes, *prepared.notes, *_left_out(model, measured))
     name = channel.name.removeprefix("sensors/").removesuffix("/rate")  # of a run's file
     return Identification(name, measured, model, floor, noise, belief, tuple(dict.fromkeys(notes)))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from testbed.signals import FloatArray
 
 # Half of a part: 6 % of its frequency, so that the response is nearly a parabola in it; enough bins for an estimate of
@@ -65,6 +67,33 @@ def spectrum_parts(power: FloatArray) -> list[SpectrumPart]:
         left[(high > low[peak]) & (low < high[peak])] = 0.0
     peaks = np.array(list(found), dtype=int)
     return [found[peak] for peak in sorted(found) if not _spilled(peak, peaks, power)]
+
+
+def quiet_parts(parts: Sequence[SpectrumPart], reference: FloatArray, output: FloatArray) -> list[SpectrumPart]:
+    """Return parts of what a reference's parts leave of the spectrum, for the noise there; lines of the output alone,
+    such as hum, are none.
+
+    Parameters
+    ----------
+    parts : sequence of SpectrumPart
+        Those of the reference.
+    reference, output : ndarray, shape (n_freq,)
+        Power at multiples of the inverse length of the record, the first one at 1.
+    """
+    free = reference > 0.0
+    free[:_FIRST] = False
+    for part in parts:
+        free[part.bins] = False
+    for line in np.flatnonzero(_stands(output)):
+        free[max(line - _OWN, 0) : line + _OWN + 1] = False
+    (low, high), begin, found = _ends(free.size), _FIRST, []
+    while begin < free.size:
+        end = begin + int(high[begin] - low[begin])
+        bins = begin + np.flatnonzero(free[begin:end])
+        if bins.size >= _LEAST:
+            found.append(SpectrumPart(bins, int(bins[bins.size // 2]), is_line=False))
+        begin = end
+    return found
 
 
 def _ends(n_freq: int) -> tuple[np.ndarray, np.ndarray]:

@@ -178,7 +178,7 @@ def _read_replay(folder: Path, run: RunRecord, sensor: str | None) -> list[RateR
 
 def _silent_readings(scenario: Scenario, name: str, true_rate: FloatArray) -> FloatArray:
     """Return what a sensor reads of the true rate without noise, level, at the temperature of the run."""
-    from testbed.sensors.base import ExposedStage, Surroundings
+    from testbed.sensors.stages import ExposedStage, Surroundings
 
     instrument, base = scenario.sensors[name], scenario.base_rate_hz
     if true_rate.size != scenario.n_time:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.fusion.belief import declared
 from testbed.judging.case import CaseFacts
 from testbed.judging.profiles import ProfileKeeper
 from testbed.judging.sights import pointing_judges, pointing_value
@@ -105,10 +104,8 @@ class Judge:
         sensors = {name: self._errors[name].result() for name in self._scenario.sensors}
         fusion = {
             name: {
-                "belief": declared(spec.belief),
-                "start": getattr(spec.parameters, "start", None),
+                **spec.facts(),
                 "gated": self._gated.get(name),
-                "caution": getattr(spec.factory, "caution", None) or None,
                 **self._errors[name].result(),
                 **self._errors[name].consistency(),
                 **self._case.floors,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from testbed.errors import ScenarioError
     from testbed.logs.plan import Plan
     from testbed.logs.stamps import StampScan
     from testbed.logs.table import Table
@@ -72,6 +73,10 @@ def kept_columns(
     kept = _Means(plans) if plans[0].average > 1 else _Columns(plans, scans)
     stamps = {one.stamps for one in plans if one.stamps is not None}
     n_time = 0
+    # What the file itself says is refused before it is read.
+    said = sum(table.columns[i].n_time or 0 for i in {one.value for one in plans} | stamps)
+    if plans[0].average == 1 and said > MOST_KEPT:
+        raise _too_many(table)
     for block in table.blocks(list(dict.fromkeys([*(one.value for one in plans), *stamps])), stamps):
         n_time += next(iter(block.values())).size
         times = {key: scan.add(block[scan.column]) for key, scan in scans.items()}
@@ -80,12 +85,16 @@ def kept_columns(
         except OverflowError as error:
             raise refusal(table.path, f"{error}: cut the record in parts", "--time") from error
         if n_kept > MOST_KEPT:
-            message = f"holds more than the {MOST_KEPT >> 20} million numbers that are kept in memory"
-            remedy = f"--average {_GOOD_AVERAGE} keeps means of as many samples, which take about 100 bytes each"
-            raise refusal(table.path, f"{message}: {remedy}")
+            raise _too_many(table)
     if not n_time:
         raise refusal(table.path, "expected at least 4 samples, got 0")
     return kept.result()
+
+
+def _too_many(table: Table) -> ScenarioError:
+    message = f"holds more than the {MOST_KEPT >> 20} million numbers that are kept in memory"
+    remedy = f"--average {_GOOD_AVERAGE} keeps means of as many samples, which take about 100 bytes each"
+    return refusal(table.path, f"{message}: {remedy}")
 
 
 class _Columns:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from testbed import units
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, shortened
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def quantity(text: str, si: str, example: str, key: str) -> float:
     except ValueError as error:
         raise ScenarioError([Problem(str(error), key=key)]) from error
     if not (value > 0.0 and math.isfinite(value)):
-        raise ScenarioError([Problem(f"expected more than 0 {si}, got {text}", key=key)])
+        raise ScenarioError([Problem(f"expected more than 0 {si}, got {shortened(text)}", key=key)])
     return value
 
 

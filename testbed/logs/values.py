@@ -115,10 +115,12 @@ class ValueScan:
             return
         if not self._n_known:
             self._origin = float(known[0])
-        rest = known - self._origin
-        self._sum += float(rest.sum())
-        self._square += float(rest @ rest)
-        self._pairs(values)
+        # Of numbers that are none the squares are infinite, and so is what comes of them.
+        with np.errstate(over="ignore", invalid="ignore"):
+            rest = known - self._origin
+            self._sum += float(rest.sum())
+            self._square += float(rest @ rest)
+            self._pairs(values)
         self._extremes(known)
         if sum(part.size for part in self._sample) < _SAMPLE:
             self._sample.append(known[:_SAMPLE])
@@ -141,7 +143,7 @@ class ValueScan:
             low=np.nan if nothing else float(self._low),
             high=np.nan if nothing else float(self._high),
             mean=np.nan if nothing else self._origin + mean,
-            std=float(np.sqrt(max(self._square / n - mean**2, 0.0))),
+            std=_std(self._square / n, mean),
             step_std=step_std,
             word=word,
             equal=equal,
@@ -218,3 +220,10 @@ def word_size(values: FloatArray) -> float:
     if np.any(np.abs(steps / word - counts) > _WHOLE * np.maximum(counts / 10.0, 1.0)):
         return 0.0
     return float(steps.sum() / counts.sum())
+
+
+def _std(square: float, mean: float) -> float:
+    """Return the standard deviation of what has this mean square and mean; infinite where the squares overflow."""
+    if not np.isfinite(square):
+        return np.inf
+    return float(np.sqrt(max(square - mean**2, 0.0)))

@@ -103,7 +103,7 @@ def _write_map(path: Path, run: RunRecord, tracks: list[Track], places: Mapping[
     for track in tracks:
         place = dict(places[track.name])
         stamps = {"column": place.pop("stamps"), "unit": "s" if place["file"].endswith(".mf4") else "ns"}
-        time = stamps if track.signals.stamped else {"rate": f"{track.sample_rate_hz!r} Hz"}
+        time = stamps if track.signals.stamped else {"rate": f"{track.signals.sample_rate_hz!r} Hz"}
         channels[track.name] = {**place, "unit": "rad/s", "time": time}
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False

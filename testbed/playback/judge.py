@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.fusion.belief import declared
 from testbed.metrics.consistency import Consistency
 from testbed.metrics.errors import ErrorMetrics
 from testbed.metrics.line_fit import Waves
@@ -109,10 +108,8 @@ class ReplayJudge:
         sensors = {name: {**self._of(name), "missing": self._spreads[name].missing} for name in self._sensors}
         fusion = {
             name: {
-                "belief": declared(spec.belief),
-                "start": getattr(spec.parameters, "start", None),
+                **spec.facts(),
                 "gated": self._gated.get(name),
-                "caution": getattr(spec.factory, "caution", None) or None,
                 **self._of(name),
                 **self._claimed(name),
                 "consistency": self._consistency[name].result(),

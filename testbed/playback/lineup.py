@@ -13,6 +13,7 @@ from scipy.interpolate import make_interp_spline
 from testbed.errors import Problem, ScenarioError
 from testbed.logs.clock import NANO
 from testbed.runs.block import first_due
+from testbed.signals import NORMAL_MEDIAN
 from testbed.units import rate_unit
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _SAME = 1e-9
 _SAME_NS = 0.5
 _BEFORE = 1.5
 # Median of |a - b| over the standard deviation of a and b, both Gaussian.
-_MEDIAN_STEP = 0.6744897501960817 * math.sqrt(2.0)
+_MEDIAN_STEP = NORMAL_MEDIAN * math.sqrt(2.0)
 # Beyond this many steps of the reference from its nearest known samples there is no reference.
 _REACH = 1.5
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from testbed.chain.interrupt import held_interrupts
 from testbed.chain.versions import versions
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted
 from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
 from testbed.logs.reader import is_map
@@ -195,7 +195,7 @@ def prepare(
     both be given.
     """
     if start not in {None, "unknown", "rest"}:
-        raise ScenarioError([Problem(f"expected unknown or rest, got {start!r}", "--start")])
+        raise ScenarioError([Problem(f"expected unknown or rest, got {quoted(start)}", "--start")])
     loaded = load_plugins(plugins)
     source = open_source([log] if isinstance(log, str | Path) else log, map)
     names, file = _asked(filters)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.logs.clock import NANO
+from testbed.runs.signals import OneSignal
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
@@ -16,8 +18,6 @@ if TYPE_CHECKING:
 
     from testbed.runs.signals import Signals
     from testbed.signals import FloatArray
-
-NANO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,22 +36,16 @@ class Track:
     signals: Signals
 
     @property
-    def n_time(self) -> int:
-        """Number of samples."""
-        return self.signals.n_time
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """Rate of the samples [Hz]."""
-        return self.signals.sample_rate_hz
+    def rate(self) -> OneSignal:
+        """The rate [rad/s], read in blocks."""
+        return OneSignal(self.signals, "rate")
 
     def blocks(self) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
         """Yield stamps [ns] since the start of the run and rates [rad/s], shapes (n_block,)."""
-        for start in range(0, self.n_time, BLOCK):
-            stop = min(start + BLOCK, self.n_time)
-            yield self.stamps(start, stop), np.asarray(self.signals.read("rate", start, stop), np.float64)
+        for start, rate in self.rate.blocks(BLOCK):
+            yield self.stamps(start, start + rate.size), rate
 
     def stamps(self, start: int, stop: int) -> NDArray[np.int64]:
         """Return the stamps [ns] of samples `start` <= k < `stop`, shape (n_time,), each rounded to the nearest."""
-        seconds = np.asarray(self.signals.read("time", start, stop), np.float64)
+        seconds = OneSignal(self.signals, "time").read(start, stop)
         return np.rint(seconds / NANO).astype(np.int64)

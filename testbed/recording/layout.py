@@ -37,6 +37,7 @@ DIAGNOSTICS = {  # prefix of the name: quantity and unit, in which {} is that of
     "gated_": ("Gated readings", "counted"),
     "R_": ("Adapted R", "({})²"),
     "N_": ("Noise statistic N", "({})²"),
+    "frequency_": ("Frequency that is seen", "Hz"),
     "band_": ("Band: 0 low, 1 mid, 2 high", "-"),
     "innovation_": ("Innovation", "{}"),
     "innovation_variance_": ("Innovation variance", "({})²"),

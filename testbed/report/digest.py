@@ -13,6 +13,7 @@ from testbed.metrics.spectra import SHORTEST_SEGMENT, WelchDensity, log_average,
 from testbed.metrics.transfer import TransferSums
 from testbed.pages.envelope import Envelope
 from testbed.report.within import adapted, correlations
+from testbed.runs.signals import OneSignal
 
 if TYPE_CHECKING:
     from testbed.allan import AllanCurve
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from testbed.report.within import Correlations
     from testbed.runs.metrics import RunMetrics
     from testbed.runs.results import RunRecord
-    from testbed.runs.signals import Signals
     from testbed.signals import FloatArray
 
 BLOCK = 2**18
@@ -121,25 +121,6 @@ def zoom_window(metrics: RunMetrics, still: float = 1.0) -> tuple[float, float]:
     return metrics.settle_s, min(metrics.settle_s + length, metrics.duration_s)
 
 
-@dataclass(frozen=True)
-class _Column:
-    """One signal of a run, read in blocks."""
-
-    signals: Signals
-    name: str
-
-    @property
-    def n_time(self) -> int:
-        return self.signals.n_time
-
-    @property
-    def sample_rate_hz(self) -> float:
-        return self.signals.sample_rate_hz
-
-    def read(self, start: int, stop: int) -> FloatArray:
-        return np.asarray(self.signals.read(self.name, start, stop), dtype=np.float64)
-
-
 def digest_run(run: RunRecord) -> Digest:
     """Gather what the figures show.
 
@@ -168,8 +149,8 @@ def digest_run(run: RunRecord) -> Digest:
     for group in tops:
         signal = _column(run, group, "rate")
         trace = _rate_trace(signal, zoom)
-        for first in range(0, signal.n_time, BLOCK):
-            _add_rate(trace, first, signal.read(first, min(first + BLOCK, signal.n_time)))
+        for first, rate in signal.blocks(BLOCK):
+            _add_rate(trace, first, rate)
         rates[group] = trace
     errors = {}
     for group in [f"sensors/{name}" for name in metrics.sensors] + [f"fusion/{name}" for name in metrics.fusion]:
@@ -188,17 +169,17 @@ def digest_run(run: RunRecord) -> Digest:
     )
 
 
-def _column(run: RunRecord, group: str, name: str, unit: str = "rad/s") -> _Column:
+def _column(run: RunRecord, group: str, name: str, unit: str = "rad/s") -> OneSignal:
     """Return a signal, its presence and unit checked."""
     signals = run.groups.get(group)
     if signals is None or name not in signals:
         raise _bad(run, f"{group}/{name}", "expected a variable with the coordinate time, got none")
     if signals.units[name] != unit:
         raise _bad(run, f"{group}/{name}", f"expected units {unit!r}, got {signals.units[name]!r}")
-    return _Column(signals, name)
+    return OneSignal(signals, name)
 
 
-def _stride(run: RunRecord, group: str, signal: _Column, reference: _Column) -> int:
+def _stride(run: RunRecord, group: str, signal: OneSignal, reference: OneSignal) -> int:
     """Return how many samples of `reference` lie in one step of `signal`; it must be a whole number."""
     ratio = reference.sample_rate_hz / signal.sample_rate_hz
     stride = round(ratio)
@@ -219,14 +200,14 @@ def _thermal(run: RunRecord, name: str) -> ThermalTrace:
     return ThermalTrace(_whole(temperature), _whole(_column(run, "truth", f"{name}_drift")))
 
 
-def _whole(signal: _Column) -> Envelope:
+def _whole(signal: OneSignal) -> Envelope:
     envelope = Envelope(0, signal.n_time, signal.sample_rate_hz, N_BINS)
-    for first in range(0, signal.n_time, BLOCK):
-        envelope.process(first, signal.read(first, min(first + BLOCK, signal.n_time)))
+    for first, values in signal.blocks(BLOCK):
+        envelope.process(first, values)
     return envelope
 
 
-def _rate_trace(signal: _Column, zoom: tuple[float, float]) -> RateTrace:
+def _rate_trace(signal: OneSignal, zoom: tuple[float, float]) -> RateTrace:
     fs = signal.sample_rate_hz
     start, stop = min(round(zoom[0] * fs), signal.n_time - 1), min(round(zoom[1] * fs) + 1, signal.n_time)
     whole, close = (Envelope(0, signal.n_time, fs, n_bins) for n_bins in (N_BINS, N_CLOSE))
@@ -240,7 +221,7 @@ def _add_rate(trace: RateTrace, first: int, rate: FloatArray) -> None:
 
 
 def _follow(
-    run: RunRecord, group: str, truth: _Column | None, zoom: tuple[float, float]
+    run: RunRecord, group: str, truth: OneSignal | None, zoom: tuple[float, float]
 ) -> tuple[RateTrace, ErrorTrace]:
     """Read one sensor or filter beside the truth, if there is one."""
     signal = _column(run, group, "rate")
@@ -297,7 +278,7 @@ def _follow(
 class _Against:
     """What a signal is compared with: the truth at its samples; without one nothing."""
 
-    def __init__(self, run: RunRecord, group: str, signal: _Column, truth: _Column | None) -> None:
+    def __init__(self, run: RunRecord, group: str, signal: OneSignal, truth: OneSignal | None) -> None:
         # The reference of a recording is on the clock of the fastest sensor; a slower one may have its own.
         self._own = truth is not None and signal.signals.stamped
         self._truth, self._signal = truth, signal

@@ -20,7 +20,7 @@ N_BINS = 400
 LAGS = 40
 _VARIANCE = "innovation_variance_"
 # What is drawn over time, by the first letters of its name; a counter of gated readings only where it counted.
-ADAPTED = ("R_", "N_", "Q_rate", "gated_")
+ADAPTED = ("R_", "N_", "Q_rate", "gated_", "frequency_")
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from testbed.pages.envelope import Envelope
     from testbed.report.within import Correlations
 
-_NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of"}
+_NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of", "frequency_": "frequency that is seen by"}
+# What is no variance of a rate: its unit.
+_PLAIN = {"gated_": "readings", "frequency_": "Hz"}
 # More decades than this above the lowest hide what the filter does most of the time.
 _DECADES = 6.0
 
@@ -32,7 +34,8 @@ _DECADES = 6.0
 def adapted_figure(
     traces: Mapping[str, Mapping[str, Envelope]], colors: Mapping[str, str], duration_s: float, unit: Unit = DEG_S
 ) -> Figure:
-    """Draw what the filters adapted over time, a panel for each quantity: variances on a logarithmic axis.
+    """Draw what the filters adapted over time, a panel for each quantity: variances and frequencies on a logarithmic
+    axis.
 
     Parameters
     ----------
@@ -51,17 +54,17 @@ def adapted_figure(
         figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * len(traces)))
         panels = figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (key, by_filter) in zip(panels, traces.items(), strict=True):
-            counted = key.startswith("gated_")
+            plain = next((of for stem, of in _PLAIN.items() if key.startswith(stem)), None)
+            scale = (unit[1] * DEGREE) ** 2 if plain is None else 1.0
             for i, name in enumerate(filters):
                 if name in by_filter:
-                    scale = 1.0 if counted else (unit[1] * DEGREE) ** 2
                     group = f"fusion/{name}"
                     draw(axes, by_filter[name], colors[group], 1.6 * 0.8**i, scale=scale, mark=marks[group])
             axes.set_title(_title(key), loc="left")
-            axes.set_ylabel("readings" if counted else f"({unit[0]})²")
+            axes.set_ylabel(plain or f"({unit[0]})²")
             axes.grid(visible=True)
-            if not counted:
-                _logarithmic(axes, by_filter.values(), (unit[1] * DEGREE) ** 2)
+            if plain != "readings":
+                _logarithmic(axes, by_filter.values(), scale)
         panels[-1].set_xlim(0.0, duration_s)
         time_axis(panels[-1], duration_s)
         arrange(figure, _handles(filters, colors))

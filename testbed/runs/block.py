@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from testbed.fusion.base import EstimateBlock
     from testbed.models.motion import CommandBlock
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.pointing.line_of_sight import PointingBlock
     from testbed.signals import FloatArray
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -97,6 +98,41 @@ class Signals(Mapping[str, "FloatArray"]):
     def __repr__(self) -> str:
         named = ", ".join(f"{name} [{unit or '-'}]" for name, unit in self.units.items())
         return f"Signals({named}; {self.n_time} samples at {self.sample_rate_hz:g} Hz)"
+
+
+@dataclass(frozen=True)
+class OneSignal:
+    """One signal of a group, read in blocks.
+
+    Parameters
+    ----------
+    signals : Signals
+        The group.
+    name : str
+        Of the signal.
+    """
+
+    signals: Signals
+    name: str
+
+    @property
+    def n_time(self) -> int:
+        """Number of samples."""
+        return self.signals.n_time
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Rate of the samples [Hz]."""
+        return self.signals.sample_rate_hz
+
+    def read(self, start: int, stop: int) -> FloatArray:
+        """Return samples `start` <= k < `stop` [SI] in double precision."""
+        return np.asarray(self.signals.read(self.name, start, stop), np.float64)
+
+    def blocks(self, size: int) -> Iterator[tuple[int, FloatArray]]:
+        """Yield the first sample of each block of `size` samples, and the block [SI]."""
+        for start in range(0, self.n_time, size):
+            yield start, self.read(start, min(start + size, self.n_time))
 
 
 class _Kept:

@@ -153,6 +153,14 @@ class FilterSpec:
         with running(f"plug-in {self.type}"):
             return self.factory(dict(self.belief), dict(sample_rate_hz), deepcopy(self.parameters))
 
+    def facts(self) -> dict[str, str | None]:
+        """Return what is said of it beside its errors: whose belief it has, what it knows of its start, a caution."""
+        return {
+            "belief": declared(self.belief),
+            "start": getattr(self.parameters, "start", None),
+            "caution": getattr(self.factory, "caution", None) or None,
+        }
+
 
 @dataclass(frozen=True)
 class Scenario:

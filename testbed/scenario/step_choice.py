@@ -16,7 +16,7 @@ from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from testbed.models.turntable.parameters import TurntableParameters
-    from testbed.models.turntable.turntable import TruthBlock
+    from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 

@@ -1,11 +1,10 @@
-"""What every instrument has in common: parameters that can be started, a stage in time, clock and converter."""
+"""What every instrument has in common: its parameters, which can be started, its clock and its data sheet."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import (
@@ -21,6 +20,7 @@ from testbed.models.turntable.parameters import Mounting
 from testbed.parts import Part
 from testbed.sensors.clock import OwnClock, Ticks, TickSampler, ticks_of
 from testbed.sensors.data_sheet import Sheet, Word
+from testbed.sensors.decimation import Decimator, divides, rate_ratio
 from testbed.sensors.faults import Fault, FaultStage, first_overlap
 from testbed.sensors.losses import Losses, LossStage
 from testbed.signals import BASE_RATE_HZ, random_stream
@@ -30,85 +30,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from pydantic_core import core_schema
 
+    from testbed.sensors.stages import SensorStage
     from testbed.signals import ComplexArray, FloatArray
-
-
-class SensorStage(Protocol):
-    """An instrument in time; state is kept, so any division into blocks gives the same bits."""
-
-    def process(self, true_rate: FloatArray) -> FloatArray:
-        """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What reaches an instrument over a block besides the rate about its axis; None: level, still, at its reference.
-
-    Parameters
-    ----------
-    cross_rate : ndarray, shape (n_time, 2), optional
-        True inertial rates about the housing's x and y axes, the sensing axis being z [rad/s].
-    specific_force : ndarray, shape (n_time, 3), optional
-        Acceleration minus gravity at the mounting, along the housing's axes [m/s^2].
-    temperature : ndarray, shape (n_time,), optional
-        Temperature of the instrument [K].
-    """
-
-    cross_rate: FloatArray | None = None
-    specific_force: FloatArray | None = None
-    temperature: FloatArray | None = None
-
-    def part(self, start: int, stop: int) -> Surroundings:
-        """Return the samples from `start` to before `stop`."""
-        rows = slice(start, stop)
-        return Surroundings(
-            *(None if x is None else x[rows] for x in (self.cross_rate, self.specific_force, self.temperature))
-        )
-
-
-@runtime_checkable
-class ExposedStage(SensorStage, Protocol):
-    """An instrument whose readings depend on its surroundings too, such as the temperature."""
-
-    def process_in(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
-        """Return the readings [rad/s] that fall into a block of the rate that the axis feels [rad/s]."""
-
-
-@runtime_checkable
-class SplitStage(SensorStage, Protocol):
-    """An instrument whose noise comes behind all that the truth goes through: its readings of a block are
-    ``finish(clean(true_rate, surroundings))``, and `clean` is the same for every seed where it is `separable`.
-    """
-
-    separable: bool
-
-    def clean(self, true_rate: FloatArray, surroundings: Surroundings) -> FloatArray:
-        """Return what it would read of a block without noise, word and losses [rad/s], at the clock of the readings."""
-
-    def finish(self, clean: FloatArray) -> FloatArray:
-        """Return the readings [rad/s] that become of what `clean` gave."""
-
-
-@runtime_checkable
-class ProfiledStage(SensorStage, Protocol):
-    """An instrument with a fluid inside, whose velocity profile can be looked at."""
-
-    heights: FloatArray
-
-    def profile(self) -> FloatArray:
-        """Return the slip at `heights` [m] as of the last sample that went in [rad/s], shape (n_height,)."""
-
-
-@runtime_checkable
-class ThermalStage(SensorStage, Protocol):
-    """An instrument with a thermometer inside, whose bias follows the temperature; both are of the last block.
-
-    `temperature` holds the thermometer's readings [K], one per reading of the rate; `drift` the true thermal bias
-    [rad/s], one value per sample of the input, which no user of the instrument knows.
-    """
-
-    temperature: FloatArray
-    drift: FloatArray
 
 
 class Sensor(Part):
@@ -265,7 +188,7 @@ class Sensor(Part):
         """Return whether its readings fall between the samples of a clock of `input_rate_hz` [Hz], or have stamps that
         are late.
         """
-        return self.clock is not None or not _whole(input_rate_hz, self.sample_rate)
+        return self.clock is not None or not divides(input_rate_hz, self.sample_rate)
 
     def ticks(self, seed: int, name: str) -> Ticks:
         """Return when it reads; arguments as `start`."""
@@ -387,46 +310,3 @@ class Sensor(Part):
             raise ValueError(msg)
         readings = self.start_faults().process(self.start(input_rate_hz, seed, "sensor").process(record))
         return self.start_losses(seed, "sensor").process(readings)
-
-
-def rate_ratio(input_rate_hz: float, sample_rate_hz: float) -> int:
-    """Return the whole number of input samples per reading.
-
-    Parameters
-    ----------
-    input_rate_hz, sample_rate_hz : float
-        Rates of the input and of the readings [Hz].
-
-    Returns
-    -------
-    int
-        Their ratio [-].
-
-    Raises
-    ------
-    ValueError
-        If the ratio is no whole number of at least one.
-    """
-    ratio = round(input_rate_hz / sample_rate_hz)
-    if not _whole(input_rate_hz, sample_rate_hz):
-        msg = f"sample_rate: expected {input_rate_hz:g} Hz over a whole number, got {sample_rate_hz:g} Hz"
-        raise ValueError(msg)
-    return ratio
-
-
-def _whole(input_rate_hz: float, sample_rate_hz: float) -> bool:
-    ratio = round(input_rate_hz / sample_rate_hz)
-    return ratio >= 1 and abs(ratio * sample_rate_hz - input_rate_hz) <= 1e-9 * input_rate_hz
-
-
-class Decimator:
-    """Takes every `ratio`-th sample, beginning with the first, across blocks of any length."""
-
-    def __init__(self, ratio: int) -> None:
-        self._ratio, self._skip = ratio, 0
-
-    def process(self, samples: FloatArray) -> FloatArray:
-        """Return the samples of this block that the clock takes, unit of `samples`."""
-        taken = samples[self._skip :: self._ratio]
-        self._skip = (self._skip - samples.size) % self._ratio
-        return taken

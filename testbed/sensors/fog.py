@@ -9,11 +9,13 @@ from numba import njit
 
 from testbed.models.fog_thermal import FogThermal
 from testbed.parts import Part
-from testbed.sensors.base import Decimator, Sensor, Surroundings, rate_ratio
+from testbed.sensors.base import Sensor
 from testbed.sensors.data_sheet import GYRO_WORDS, Word
+from testbed.sensors.decimation import Decimator, rate_ratio
 from testbed.sensors.gyro_errors import GainError
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage
+from testbed.sensors.stages import Surroundings
 from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
 from testbed.units import Frequency, PositiveDuration, Quantity, Range, RatioPerKelvin
 

@@ -24,7 +24,7 @@ from testbed.units import (
 )
 
 if TYPE_CHECKING:
-    from testbed.sensors.base import Surroundings
+    from testbed.sensors.stages import Surroundings
     from testbed.signals import ComplexArray, FloatArray
 
 # Along the sensing axis of a level instrument at rest.

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from testbed.sensors.base import Decimator, Sensor, Surroundings
+from testbed.sensors.base import Sensor
 from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import GYRO_WORDS, LOW_PASSES, Sheet, Word, low_pass_schema
 from testbed.sensors.gyro_errors import AgedSampler, Fir, GyroErrors
 from testbed.sensors.noise import GyroTerms
 from testbed.sensors.noise_terms import NoiseStage, Ramp
 from testbed.sensors.sampled_noise import Rational
+from testbed.sensors.stages import Surroundings
 from testbed.signals import BASE_RATE_HZ, LinearFilter, random_stream, transfer
 from testbed.units import Frequency, Quantity, Range, RateStd
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from testbed.sensors.clock import TickSampler
+    from testbed.sensors.decimation import Decimator
     from testbed.signals import ComplexArray, FloatArray
 
 WordSensitivity = Annotated[float, Quantity("LSB*s/rad", "2621440 LSB/(deg/s)", above=0.0)]

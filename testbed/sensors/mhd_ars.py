@@ -13,13 +13,14 @@ from testbed.models.mhd_channel.linear_range import linear_range
 from testbed.models.mhd_channel.ring import ChannelRing
 from testbed.models.mhd_channel.thermal_drift import REFERENCE
 from testbed.sensors.analogue import OnePole, SaturationStage
-from testbed.sensors.base import Sensor, Surroundings
+from testbed.sensors.base import Sensor
 from testbed.sensors.converter import Converter, rounding_psd
 from testbed.sensors.data_sheet import OUTPUT_RATE, RATE_NOISE_DENSITY, Word
 from testbed.sensors.mhd_electronics import Delay, Linear, LowPass, Saturation, Transformer
 from testbed.sensors.noise import ElectronicTerms
 from testbed.sensors.noise_terms import NoiseStage
 from testbed.sensors.sampled_noise import SampledNoise, Shape, sampled
+from testbed.sensors.stages import Surroundings
 from testbed.signals import random_stream
 from testbed.units import Duration, Frequency, Quantity, ScaleFactor, Temperature, Voltage
 

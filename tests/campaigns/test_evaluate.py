@@ -36,11 +36,17 @@ def differences(ours, theirs, path=""):
         yield path, ours, theirs
 
 
+def of_run(scenario, seed):
+    """Return the metrics of a run without the fluid over the height of a channel: a picture for its report."""
+    found = testbed.run(scenario, seed=seed).metrics.to_dict()
+    found.pop("profiles", None)
+    return found
+
+
 def agrees(scenario, seeds=SEEDS):
     found = testbed.evaluate(scenario, seeds)
     for seed, metrics in zip(seeds, found, strict=True):
-        expected = testbed.run(scenario, seed=seed).metrics
-        assert list(differences(metrics.to_dict(), expected.to_dict())) == []
+        assert list(differences(metrics.to_dict(), of_run(scenario, seed))) == []
 
 
 def shortened(path):
@@ -136,8 +142,7 @@ def test_settings_are_evaluated_each_under_every_seed(tmp_path):
     assert [len(row) for row in table] == [2] * 4
     for change, row in zip(changes, table, strict=True):
         for seed, metrics in zip(SEEDS, row, strict=True):
-            expected = testbed.run(scenario.with_(**change), seed=seed).metrics
-            assert list(differences(metrics.to_dict(), expected.to_dict())) == []
+            assert list(differences(metrics.to_dict(), of_run(scenario.with_(**change), seed))) == []
 
 
 def test_settings_that_move_the_truth_have_their_own(tmp_path):

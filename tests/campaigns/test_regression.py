@@ -223,6 +223,12 @@ def test_a_campaign_goes_on_with_the_code_that_began_it_and_is_played_anew_by_an
         run_regression(**options)
 
 
+def test_an_update_without_a_reason_is_refused_before_anything_is_played(tmp_path, monkeypatch):
+    monkeypatch.setattr("testbed.campaigns.regression.regress.sweep", None)
+    with pytest.raises(ScenarioError, match="expected a reason"):
+        run_regression(update=" ", out=tmp_path / "out")
+
+
 def test_the_code_of_a_campaign_is_the_package_and_the_plugin(tmp_path):
     plugin = tmp_path / "mine.py"
     plugin.write_text("a = 1")

@@ -266,3 +266,15 @@ def test_what_a_task_gives_can_be_sent(tmp_path):
     taken = []
     play_here(Agenda(study, ()), lambda _, found: taken.extend(found))
     assert taken == rows
+
+
+def test_a_sensors_clock_sweeps(tmp_path):
+    """Each case has a clock of its own, the first one none; its rows are those of a run."""
+    axis = "vary: {sensors.mems_gyro.clock.error: [0 ppm, 500 ppm]}\nseeds: 1\n"
+    study = load_study(written(tmp_path, axis))
+    rows = {(row["case"], row["source"]): row for row in open_sweep(sweep(study, out=tmp_path / "out")).to_pylist()}
+    assert [rows[case.number, "kalman"]["sensors.mems_gyro.clock.error"] for case in study.cases] == [0.0, 5e-4]
+    for case in study.cases:
+        metrics = testbed.run(case.scenario, seed=study.seeds[0]).metrics
+        assert rows[case.number, "kalman"]["rmse_deg_s"] == pytest.approx(metrics.fusion["kalman"].rmse_deg_s, rel=1e-9)
+    assert rows[0, "kalman"]["rmse_deg_s"] != rows[1, "kalman"]["rmse_deg_s"]

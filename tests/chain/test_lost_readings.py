@@ -15,7 +15,7 @@ from testbed.errors import ScenarioError
 from testbed.judging.table_facts import table_facts
 from testbed.report.digest import _bridged
 from testbed.sensors import load_preset
-from testbed.sensors.base import Surroundings
+from testbed.sensors.stages import Surroundings
 from tests.scenes import short
 
 GYRO = "  mems_gyro: {preset: adis16505_filtered}"

@@ -12,7 +12,8 @@ from pydantic import BaseModel
 
 from testbed.parts import preset, preset_names, resolve
 from testbed.sensors import SENSORS, load_preset
-from testbed.sensors.base import ExposedStage, Sensor, Surroundings, ThermalStage
+from testbed.sensors.base import Sensor
+from testbed.sensors.stages import ExposedStage, Surroundings, ThermalStage
 from testbed.units import Quantity
 from tests.examples.programs import example
 

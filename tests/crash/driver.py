@@ -1,6 +1,7 @@
 """Kills, full disks and read-only folders, many times over; says what was not whole afterwards.
 
-``python -m tests.crash.driver kill run 200 SEED FOLDER`` (or report, training), ``... disk 20 FOLDER``. Each action
+``python -m tests.crash.driver kill run 200 SEED FOLDER`` (or report, training, replayed, exported, identified, swept),
+``... disk 20 FOLDER``. Each action
 runs in a fork of this process, which has the libraries loaded and no thread. Prints one JSON object: how many ended
 how, and the faults.
 """
@@ -25,11 +26,19 @@ import numpy as np
 from ruamel.yaml import YAML
 
 import testbed
+from testbed.campaigns.sweep import open_sweep, sweep
 from testbed.chain import runner
 from testbed.drift.records import Columns
 from testbed.drift.session import read_model, train_model
 from testbed.errors import RunError, ScenarioError
+from testbed.fusion.belief_file import read_belief
+from testbed.identification.belief_text import belief_text
+from testbed.identification.session import identify_sensors
+from testbed.logs import read_log
+from testbed.playback.export import export
+from testbed.playback.replay import replay
 from testbed.report import write_report
+from testbed.runs.atomic import write_bytes
 from testbed.runs.folder import failing_as_run_error
 from testbed.runs.manifest import read_manifest, strangers
 from tests.scenes import short
@@ -41,6 +50,28 @@ from testbed.chain import runner
 runner.require_space = lambda *_: None
 main()
 """
+
+
+# A recording of a reference and of two sensors, and how long it is not judged.
+SENSORS, SETTLES, FORMATS = ("mhd_ars", "mems_gyro"), (0.25, 0.5), ("csv", "hdf5")
+RECORDED = {"channels": {n: {"column": n, "unit": "rad/s", "time": {"rate": "1 kHz"}} for n in (*SENSORS, "reference")}}
+BASE = """\
+name: base
+duration: 0.1 s
+turntable: {mode: ideal}
+motion: [{sine: {frequency: 50 Hz, rate: 1 deg/s}}]
+sensors: {mems_gyro: {preset: adis16505}}
+fusion: {kalman: {}}
+"""
+STUDY = "{name: study, base: base.yaml, vary: {sensors.mems_gyro.noise: [on, off]}, seeds: 8}"
+
+
+def _write_recording(path):
+    rng = np.random.default_rng(5)
+    rate = 0.02 * rng.standard_normal(8000)
+    rows = rate[:, None] * np.array([1.0, 0.98, 1.02]) + 1e-4 * rng.standard_normal((rate.size, 3)) * [0.0, 1.0, 1.0]
+    lines = [",".join(f"{one:.9f}" for one in row) for row in rows]
+    path.write_text("\n".join([",".join(("reference", *SENSORS)), *lines]) + "\n")
 
 
 class Scene:
@@ -56,6 +87,9 @@ class Scene:
                 rate = 0.1 * (heat - 300.0) + np.random.default_rng(3).standard_normal(heat.size)
                 rows = [f"{w:.6f},{k:.6f}" for w, k in zip(rate, heat, strict=True)]
                 (folder / f"{name}.csv").write_text("\n".join(["rate,temperature", *rows]) + "\n")
+            _write_recording(folder / "log.csv")
+            (folder / "base.yaml").write_text(BASE)
+            (folder / "study.yaml").write_text(STUDY)
 
     def run(self, number):
         runner.run(testbed.load_scenario(self.folder / "short.yaml"), out=self.place, seed=number)
@@ -69,10 +103,36 @@ class Scene:
         columns = Columns(temperature_unit="K", sample_rate="0.1 Hz")
         train_model([source], columns, "gradient", self.model, lambda _: None)
 
+    def replayed(self, number):
+        """Send the recording through a filter; from when on it is judged tells one replay from another."""
+        replay(
+            self.folder / "log.csv", ["kalman"], map=RECORDED, settle=SETTLES[number % 2], out=self.folder / "replay"
+        )
+
+    def exported(self, number):
+        """Write the run, which is made first, in one of two formats."""
+        if not self.place.exists():
+            self.run(0)
+        export(self.place, FORMATS[number % 2], self.folder / "export")
+
+    def identified(self, number):
+        """Tell one of two sensors from the reference, and write what filters may believe of it."""
+        name = SENSORS[number % 2]
+        found = identify_sensors(read_log(self.folder / "log.csv", map=RECORDED), "reference", name, one_clock=True)
+        with failing_as_run_error("belief"):
+            write_bytes(self.folder / "belief.yaml", belief_text(found, "log.csv").encode())
+
+    def swept(self, _number):
+        """Go on with a sweep, or play it whole where it is done."""
+        if (self.folder / "sweep" / "sweep.html").exists():
+            shutil.rmtree(self.folder / "sweep")
+        sweep(self.folder / "study.yaml", out=self.folder / "sweep")
+
     def faults(self):
         """Yield what is not whole, or is not what its name says."""
         if self.place.exists():
             yield from self._faults_of_run()
+        yield from self._faults_of_outputs()
         if self.model.exists():
             read_model(self.model)
             known = list(json.loads(self.model.read_text())["trained_on"].values())
@@ -81,6 +141,28 @@ class Scene:
         left = [path.name for path in self.folder.iterdir() if path.name.endswith(".partial")]
         if len(left) > 1:
             yield f"leftovers that were not swept: {left}"
+
+    def _faults_of_outputs(self):
+        """Yield what a replay, an export, an identification or a sweep left that is not whole."""
+        if (place := self.folder / "replay").exists():
+            played = testbed.open_run(place)
+            yield from strangers(place)
+            if not (played.metrics["settle_s"] in SETTLES and np.isfinite(played.fusion["kalman"].rate[-1])):
+                yield "the replay breaks off"
+        if (place := self.folder / "export").exists():
+            yield from (f"{name} is missing" for name in read_manifest(place)["files"] if not (place / name).is_file())
+            sizes = {channel.rate().values.size for channel in read_log(place / "log.yaml").channels.values()}
+            if sizes != {10_000, 1000}:
+                yield f"the export has {sizes} samples"
+        if (place := self.folder / "belief.yaml").exists() and list(read_belief(place)) not in [[n] for n in SENSORS]:
+            yield "a belief of another sensor"
+        if (place := self.folder / "sweep").exists() and (place / "cases.parquet").exists():
+            rows = open_sweep(place).to_pylist()
+            once = {(row["case"], row["seed"], row["source"]) for row in rows}
+            if len(once) != len(rows) or any(row["status"] != "ok" for row in rows):
+                yield "a case is there twice, or failed"
+            if (place / "sweep.html").exists() and "</html>" not in (place / "sweep.html").read_text():
+                yield "the page of the sweep breaks off"
 
     def _faults_of_run(self):
         run, manifest = testbed.open_run(self.place), read_manifest(self.place)

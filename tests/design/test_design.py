@@ -115,6 +115,13 @@ def test_a_filter_that_adapts_has_no_spectrum_and_is_left_out(found):
         ("100 ms:", "100 m:", "rpe_urad.100 m", "wrong dimension"),
         ("duration: 6 s", "duraton: 6 s", "duraton", "did you mean"),
         ("frequency: 30 Hz", "frequency: 30", "motion.0.sine.frequency", "unit is missing"),
+        ('"< 0.5"}', '"> 0.5"}', "rpe_urad.100 ms", "an upper bound"),
+        ('"< 0.5"}', '"< 0.5 mrad"}', "rpe_urad.100 ms", "expected a bound"),
+        ("100 ms:", "30 s:", "rpe_urad", "within the 4 s after settle"),
+        ("duration: 6 s", "duration: 6 s\npointing: {}", "pointing", "is chosen"),
+        ("duration: 6 s", "duration: 6 s\nexpect: {}", "expect", "is what is asked"),
+        ("duration: 6 s", "duration: 6 s\nturntable: {mode: servo}", "turntable", "is ideal here"),
+        ("cost: 5}", "fades: [{at: 1 s, length: 1 s}], cost: 5}", "trackers.coarse.fades", "expected none"),
     ],
 )
 def test_what_is_wrong_is_found_at_its_place(tmp_path, old, new, key, words):

@@ -193,6 +193,20 @@ def test_late_readings_are_dropped_and_counted() -> None:
     assert np.array_equal(np.concatenate([first.rate, second.rate]), without.rate)
 
 
+@pytest.mark.parametrize("name", ["kalman", "wideband", "complementary"])
+def test_a_clock_that_all_share_may_be_off(name: str) -> None:
+    """So the fastest sensor of a scenario stays on the run's: what its clock is off by, the others' are the other way.
+    Every step is longer by e, and with it each mode's phase over it and each variance: an estimate moves by a few e.
+    """
+    e, rates = 20e-6, {"mhd_ars": 20e3, "mems_gyro": 2003.704}
+    readings, stamps = record(20e3, 2003.704, 4000)
+    begin = 5_000_000_000
+    late = {key: begin + np.rint((one - begin) * (1.0 + e)).astype(np.int64) for key, one in stamps.items()}
+    true, off = (built(name, rates).process(readings, one).rate for one in (stamps, late))
+    assert np.abs(off - true).max() < 10.0 * e * np.abs(true).max()
+    assert np.any(off != true)
+
+
 def test_a_file_is_sorted_first() -> None:
     readings, stamps = record(1e3, 400.0, 300)
     order = {name: random_stream(3, name).permutation(one.size) for name, one in stamps.items()}

@@ -1,4 +1,4 @@
-"""Hostile inputs, each a function of its seed: scenario texts, mutated scenarios, hostile YAML, drift models, maps."""
+"""Hostile inputs, each a function of its seed: texts, mutated documents, hostile YAML, drift models, options."""
 
 from __future__ import annotations
 
@@ -12,87 +12,29 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 from tests.fuzz.models import drift_model
+from tests.fuzz.texts import BASES, BELIEF, FUSION, MAP, REQUIREMENT, RESPONSE, STUDY
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").rglob("*.yaml"))
-
-# Every kind of part in a run of a fraction of a second, so that what is accepted is checked quickly.
-PARTS = """\
-name: parts
-seed: 7
-duration: 0.2 s
-settle: 0.1 s
-bandwidth: 1 kHz
-temperature: {start: 25 degC, steps: [{hold: 1 s}, {ramp: 40 degC, rate: 1 K/min}]}
-turntable:
-  preset: air_bearing
-  mode: digital
-  digital: {controller_rate: 20 kHz, encoder_bits: 30}
-  cogging: [{torque: 1 mN*m, periods: 24}]
-  floor:
-    lines: [{axis: x, frequency: 30 Hz, displacement: 1 nm}]
-    bands: [{axis: rz, low: 2 Hz, high: 80 Hz, angular_acceleration_psd: 1e-6 (rad/s^2)^2/Hz}]
-  earth_rate: {latitude: 48 deg}
-motion:
-  - sine: {frequency: 0.5 Hz, angle: 5.555 mrad}
-  - chirp: {start_frequency: 1 Hz, stop_frequency: 20 Hz, rate: 0.1 deg/s}
-  - multisine: {frequencies: [1 Hz, 2 Hz, 3 Hz], rate: 0.1 deg/s}
-  - random: {psd: 1e-6 (deg/s)^2/Hz, low: 1 Hz, high: 80 Hz}
-  - reaction_wheel: {speed: 600 rev/min, inertia: 5 kg*m^2, harmonics: [{number: 1, coefficient: 13.7 g*cm^2}]}
-sensors:
-  mhd_ars: {preset: sx300}
-  mems_gyro: {preset: adis16505_filtered}
-  fog: {preset: fog_paper3, sample_rate: 1 kHz}
-fusion:
-  kalman: {q: 0.1 (deg/s)^2/s, belief: exact}
-  arw_shakf: {belief: exact}
-  mine:
-    type: wideband
-    belief:
-      mhd_ars: {numerator: [1, 0], denominator: [1, 10], output_noise: 100 nrad/s/sqrt(Hz)}
-      mems_gyro: {numerator: [1], denominator: [0.001, 1], output_noise: 100 urad/s/sqrt(Hz)}
-      fog: {numerator: [1], denominator: [0.001, 1], output_noise: 100 urad/s/sqrt(Hz)}
-expect:
-  kalman: {rmse_deg_s: "< 0.0143"}
-"""
-TWO_PATHS = """\
-name: two
-duration: 0.1 s
-turntable: {mode: ideal}
-motion:
-  - constant: {rate: 0.1 deg/s}
-sensors:
-  mhd_ars: {preset: sx300}
-  mems_gyro: {preset: adis16505}
-fusion:
-  complementary: {}
-  blending: {}
-  steady_state: {frequency: 10 Hz, amplitude: 1 deg/s}
-  shakf: {}
-  allan_srkf: {}
-"""
-FIXED = """\
-name: fixed
-duration: 100 s
-turntable: {mode: fixed}
-motion:
-  - static: {}
-sensors:
-  fog: {preset: fog_paper3}
-"""
-BASES = (PARTS, TWO_PATHS, FIXED)
-# A recording, and the map that reads it.
-LOG = "t [us],w [deg/s],gy,angle\n" + "".join(f"{500 * k},{k % 7},{k % 5},{k}\n" for k in range(200))
-MAP = """\
-file: log.csv
-separator: ","
-decimal: "."
-encoding: utf-8
-skip: 0
-channels:
-  mhd_ars: {column: "w [deg/s]", unit: deg/s, sign: -1, range: 10 deg/s, time: {column: "t [us]", unit: us}}
-  mems_gyro: {column: gy, scale: 0.07 deg/s, kind: rate, axis: z, time: {rate: 2000 Hz, offset: 1 ms}}
-  reference: {column: 4, unit: arcsec, kind: angle, time: {column: 1, unit: us, epoch: 2024-05-01T12:00:00}}
-"""
+# A command with what it reads, which lies beside the case and is refused where all else is well, so that nothing long
+# is played; and its options that take words.
+COMMANDS = {
+    "replay": (
+        ["log.csv", "--map", "map.yaml"],
+        ("--filter", "--belief", "--start", "--settle", "--lines", "--outputs", "--fusion"),
+    ),
+    "export": (["missing"], ("--format",)),
+    "identify": (
+        ["response.csv", "--input=2", "--output=3"],
+        ("--output", "--input", "--separator", "--decimal", "--skip", "--only"),
+    ),
+    "sweep": (["study.yaml", "--only=x"], ("--only", "--workers", "--scheduler")),
+    "regress": (["--filter=x"], ("--only", "--filter", "--workers", "--update")),
+    "design": (["missing.yaml"], ("--seeds",)),
+}
+WORDS = (
+    *("kalman", "kalman,imm", ",", "kalman,,", "mhd_ars", "rest", "csv", "eq39", "2", "3", "0:1", "-1:0", "1:x", ":"),
+    *("metrics", "report,metrics", "os:system", "10 Hz", "0.5, 10 Hz", "0", "map.yaml", "missing.yaml", "", "tab"),
+)
 
 NUMBERS = (
     *("0", "-0", "-1", "1", "1e-300", "1e300", "5e-324", "1.7e308", "1e-12", "1e9", "1e12", "1e-6", "1e6", "nan"),
@@ -266,7 +208,55 @@ def log_map(rng):
     return MAP[:i] + rng.choice((*TOKENS, *NUMBERS, *UNITS)) + MAP[i + rng.choice((0, 1, 10)) :]
 
 
-KINDS = {"text": scenario_text, "tree": scenario_tree, "yaml": hostile_yaml, "model": drift_model, "map": log_map}
+def tree_of(text):
+    """Return the maker of texts whose tree is that of a document, changed."""
+    return lambda rng: mutated(rng, text)
+
+
+def response_text(rng):
+    """Return a recording some of whose fields were changed, or its characters."""
+    rows = RESPONSE.splitlines()
+    for _ in range(rng.choice((1, 3, 100))):
+        row = rng.randrange(len(rows))
+        fields = rows[row].split(",")
+        fields[rng.randrange(len(fields))] = rng.choice((*NUMBERS, "", "nan", "x", "0", "1,2"))
+        rows[row] = ",".join(fields)
+    if rng.random() < 0.3:
+        del rows[rng.randrange(len(rows)) :]
+    if rng.random() < 0.3:
+        rows[rng.randrange(len(rows))] = rng.choice(TOKENS)
+    return "\n".join(rows)
+
+
+def options(rng):
+    """Return the words of a command line, as JSON: one of `COMMANDS` with one to three options of any value."""
+    name = rng.choice(list(COMMANDS))
+    given, known = COMMANDS[name]
+    extra = [f"{rng.choice(known)}={word(rng)}" for _ in range(rng.choice((1, 1, 2, 3)))]
+    return json.dumps([name, *given, *extra])
+
+
+def word(rng):
+    roll = rng.random()
+    if roll < 0.5:
+        return rng.choice(WORDS)
+    number = rng.choice((*NUMBERS, "9" * 5000))
+    return number if roll < 0.7 else f"{number}:{number}" if roll < 0.8 else str(rng.choice(SCALARS))
+
+
+KINDS = {
+    "text": scenario_text,
+    "tree": scenario_tree,
+    "yaml": hostile_yaml,
+    "model": drift_model,
+    "map": log_map,
+    "belief": tree_of(BELIEF),
+    "fusion": tree_of(FUSION),
+    "study": tree_of(STUDY),
+    "requirement": tree_of(REQUIREMENT),
+    "response": response_text,
+    "options": options,
+}
 
 
 def case(kind, seed):

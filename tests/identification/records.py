@@ -71,8 +71,11 @@ class Record:
     delay: float
 
     def response(self, freq_hz):
-        """Return the true response [-]."""
-        return transfer(NUMERATOR, DENOMINATOR, freq_hz) * np.exp(-2j * np.pi * freq_hz * self.delay)
+        """Return the true response [-]: to the straight lines between samples of the base clock, which have sinc^2 of a
+        sine, 1.2e-4 less at 121 Hz; the noise leaves 1e-4 unsure.
+        """
+        lines = np.sinc(freq_hz / BASE_HZ) ** 2
+        return lines * transfer(NUMERATOR, DENOMINATOR, freq_hz) * np.exp(-2j * np.pi * freq_hz * self.delay)
 
 
 def record(excitation, seed, *, length=20.0, clock=None, delay=0.35e-3, std=1e-4, reference_std=0.0, as_angle=False):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from testbed.allan import allan_deviation
@@ -77,6 +79,15 @@ def test_what_memory_should_not_hold_is_refused_with_the_option(tmp_path, monkey
     assert read_log(path, average=100).channels["w"].values.size == 39
     with pytest.raises(ScenarioError, match="from 1 on"):
         read_log(path, average=0)
+
+
+def test_a_file_that_says_how_much_it_holds_is_refused_unread(tmp_path, monkeypatch):
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table({"w [rad/s]": np.zeros(6000), "t [ns]": np.arange(6000) * 1_000_000}), path)
+    monkeypatch.setattr(keeping, "MOST_KEPT", 10_000)
+    monkeypatch.setattr("testbed.logs.table.Table.blocks", None)
+    with pytest.raises(ScenarioError, match="--average 1000 keeps means"):
+        read_log(path)
 
 
 def test_uneven_stamps_are_refused_with_means_too(tmp_path):

@@ -61,6 +61,17 @@ def is_there(name: str) -> bool:
         return True
 
 
+# What has no reader of its own: lists of links, and pages of the repository itself.
+OTHER = {"index", "howto", "glossary", "contributing", "security"}
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/*.md")), ids=lambda path: path.stem)
+def test_every_page_begins_with_whom_it_is_for_or_its_question(page):
+    if page.stem not in OTHER:
+        begin = page.read_text(encoding="utf-8").split("\n\n")[1]
+        assert begin.startswith(("For who", "For everyone", "**The question.**")), begin
+
+
 def test_the_picture_is_that_of_the_house():
     assert PICTURE.read_text(encoding="utf-8") == picture(), "run `make pictures`"
 

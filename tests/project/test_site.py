@@ -66,6 +66,16 @@ def test_the_options_of_a_directive_have_lines_of_their_own():
     assert [line for line in lines if re.match(r"\s*:[a-z-]+:.* :[a-z-]+:", line)] == []
 
 
+def test_no_mean_is_taken_for_markup():
+    """``<s>`` in prose is an element of HTML that strikes out the rest of the page, its contents too."""
+    pages = [path for path in DOCS.rglob("*.md") if not {"_build", "_static", "gallery", "generated"} & set(path.parts)]
+    found = []
+    for path in pages:
+        text = re.sub(r"^```.*?^```$|`[^`]*`|^    .*?$", "", path.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+        found += [(path.name, tag) for tag in re.findall(r"<[A-Za-z]+>", text)]
+    assert found == []
+
+
 def test_the_gallery_has_a_question_and_a_picture_a_script():
     scripts = sorted(GALLERY.glob("plot_*.py"))
     assert len(scripts) >= 12

@@ -18,7 +18,7 @@ RUN = {
     "turntable": {"engine": "modal"},
     "motion": [{"sine": {"frequency": "80 Hz", "rate": "1 deg/s"}}],
     "sensors": {"mhd_ars": {"preset": "sx300"}, "mems_gyro": {"preset": "adis16505_filtered"}},
-    "fusion": {"kalman": {"belief": "eq39"}, "shakf": {}},
+    "fusion": {"kalman": {"belief": "eq39"}, "shakf": {}, "wideband": {}},
 }
 
 
@@ -47,9 +47,19 @@ def test_correlations_are_those_of_the_stored_innovations(run):
 
 def test_only_what_adapts_is_drawn_and_variances_have_decades(run, figures):
     adapted = digest_run(run).adapted
-    assert {name for by_filter in adapted.values() for name in by_filter} == {"shakf"}
-    assert {"R_mhd_ars", "R_mems_gyro"} <= set(adapted)
+    assert {name for by_filter in adapted.values() for name in by_filter} == {"shakf", "wideband"}
+    assert set(adapted["R_mhd_ars"]) == set(adapted["R_mems_gyro"]) == {"shakf"}
     assert {axes.get_yscale() for axes in figures["adapted"].axes} == {"log"}
+
+
+def test_the_frequency_that_the_sensors_see_is_drawn_in_hertz(run, figures):
+    """80 Hz, from the MHD ARS to its noise: 1 deg/s over some 0.01 deg/s of it, a second of means."""
+    assert run.fusion["wideband"].units["frequency_mhd_ars"] == "Hz"
+    assert run.fusion["wideband"].frequency_mhd_ars[-1] == pytest.approx(80.0, rel=1e-2)
+    (axes,) = [axes for axes in figures["adapted"].axes if axes.get_title(loc="left").endswith("seen by mhd_ars")]
+    assert axes.get_ylabel() == "Hz"
+    drawn = np.concatenate([part.vertices[:, 1] for part in axes.collections[0].get_paths()])
+    assert np.min(np.abs(drawn - 80.0)) < 0.8
 
 
 def test_responses_are_those_of_the_parts_and_of_the_belief(run):

@@ -7,8 +7,9 @@ from testbed.errors import UnknownNameError
 from testbed.models.turntable.parameters import Mounting
 from testbed.parts import preset_names
 from testbed.sensors import SENSORS, load_preset
-from testbed.sensors.base import Decimator, Sensor, rate_ratio
+from testbed.sensors.base import Sensor
 from testbed.sensors.converter import Converter
+from testbed.sensors.decimation import Decimator, rate_ratio
 from testbed.sensors.mems_gyro import MemsGyro
 
 PRESETS = preset_names("testbed.sensors")

@@ -11,9 +11,9 @@ import pytest
 
 from testbed.allan import allan_deviation, fit_allan
 from testbed.sensors import load_preset
-from testbed.sensors.base import Surroundings, ThermalStage
 from testbed.sensors.fog import Fog, IntervalMean
 from testbed.sensors.noise_terms import NoiseStage
+from testbed.sensors.stages import Surroundings, ThermalStage
 
 HOUR = np.deg2rad(1.0) / 3600.0  # deg/h
 PRESET = load_preset("fog_paper3")

@@ -13,10 +13,10 @@ from pydantic import ValidationError
 from testbed.allan import allan_deviation
 from testbed.models.temperature import TemperatureProfile
 from testbed.sensors import load_preset, mems_gyro, noise
-from testbed.sensors.base import Surroundings
 from testbed.sensors.gyro_errors import Fir
 from testbed.sensors.mems_gyro import MemsGyro
 from testbed.sensors.noise import GyroNoise
+from testbed.sensors.stages import Surroundings
 from testbed.signals import random_stream
 
 FS = 20_000.0

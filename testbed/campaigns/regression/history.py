@@ -74,6 +74,12 @@ def latest(history: Sequence[Row], campaign: str) -> list[Row]:
     return [row for row in own if row["entry"] == last]
 
 
+def check_reason(reason: str) -> None:
+    """Raise ScenarioError if there is no reason why a baseline is another."""
+    if not reason.strip():
+        raise ScenarioError([Problem("expected a reason: what changed the numbers, in a sentence", "--update")])
+
+
 def append(rows: Iterable[Row], costs: Mapping[str, float], campaign: str, reason: str, path: Path = HISTORY) -> None:
     """Store the rows of a campaign as its baseline from now on.
 
@@ -98,8 +104,7 @@ def append(rows: Iterable[Row], costs: Mapping[str, float], campaign: str, reaso
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not reason.strip():
-        raise ScenarioError([Problem("expected a reason: what changed the numbers, in a sentence", "--update")])
+    check_reason(reason)
     history = read_history(path)
     common = {
         "campaign": campaign,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.regression.compare import Move, incomparable, moves
-from testbed.campaigns.regression.history import HISTORY, append, essence, latest, read_history
+from testbed.campaigns.regression.history import HISTORY, append, check_reason, essence, latest, read_history
 from testbed.campaigns.regression.leaderboard import Standing, costs_of, standings
 from testbed.campaigns.regression.page import write_leaderboard
 from testbed.campaigns.regression.standard import SHORT, STANDARD, Contenders, shipped, standard_study
@@ -80,6 +80,8 @@ def run_regression(
         raise ScenarioError(
             [Problem("expected no --filter: the baseline is that of the filters that ship", "--update")]
         )
+    if update is not None:
+        check_reason(update)
     begun = _spent()
     plugins = entry.plugins if entry else ()
     study = replace(standard_study(entry or shipped(), short=short), code=code_sha256(plugins))

@@ -24,7 +24,7 @@ def list_parts(
     ] = None,
     plugin: PluginModules = None,
 ) -> None:
-    """List motions, sensors, filters, presets, beliefs, bands, drift models and papers; or the parts' figures."""
+    """List motions, sensors, filters, presets, beliefs, bands, drift methods and papers; or the parts' figures."""
     if what is Choice.parts:
         from testbed.cli.part_figures import part_figures, print_part_figures
 

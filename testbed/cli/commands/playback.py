@@ -9,7 +9,7 @@ import typer
 
 from testbed.cli.options import Output, PluginModules, RunDir, expanded
 from testbed.cli.status import MISSED
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted
 
 
 def _filters(incomplete: str) -> list[str]:
@@ -133,5 +133,5 @@ def _list(text: str | None) -> list[str]:
     """Return the parts of a list with commas."""
     parts = [part.strip() for part in (text or "").split(",")]
     if len(parts) > 1 and not all(parts):
-        raise ScenarioError([Problem(f"expected names with commas between them, got {text!r}", "--filter")])
+        raise ScenarioError([Problem(f"expected names with commas between them, got {quoted(text)}", "--filter")])
     return [part for part in parts if part]

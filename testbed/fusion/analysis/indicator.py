@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import lfilter
 
+from testbed.signals import BLOCK
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 # Lags [s] of the increments, each four times the one before: from 0.12 Hz (a sixteenth of a turn in the longest) to 1
 # kHz.
 LAGS_S = tuple(0.5e-3 * 4.0**i for i in range(6))
+# Time constant of the means [s], and signal over noise, by energy, from which a lag is used.
+MEMORY_S, MARGIN = 1.0, 1.0
+FREQUENCY = "frequency_"
 # A lag is long enough once the signal turns by this angle in it [rad]; the next shorter one then sees at least a
 # quarter of a turn less.
 _TURN = np.pi / 8.0
@@ -107,6 +112,12 @@ def noise_energies(belief: SensorBelief, sample_rate_hz: float, lag: int) -> tup
     return r[0] - r[2], 2.0 * r[0] - r[1] - 2.0 * r[2] + r[3]
 
 
+def fits_lags(sample_rate_hz: float) -> bool:
+    """Return whether every lag is a whole number of readings at that rate [Hz]."""
+    lags = sample_rate_hz * np.array(LAGS_S)
+    return bool(lags[0] > 0.5 and np.allclose(np.rint(lags), lags, rtol=1e-9, atol=0.0))
+
+
 @dataclass(frozen=True)
 class FrequencyBlock:
     """Frequencies over a block, NaN where no signal stands above the noise.
@@ -128,7 +139,7 @@ class _Energies:
 
     def __init__(self, belief: SensorBelief, sample_rate_hz: float, memory: float, margin: float) -> None:
         self.lags = [round(sample_rate_hz * lag) for lag in LAGS_S]
-        if not np.allclose(self.lags, sample_rate_hz * np.array(LAGS_S), rtol=1e-9, atol=0.0):
+        if not fits_lags(sample_rate_hz):
             msg = f"sample_rate_hz: expected a multiple of {1.0 / LAGS_S[0]:g} Hz, got {sample_rate_hz:g}"
             raise ValueError(msg)
         self._seconds = np.array(LAGS_S)
@@ -173,6 +184,52 @@ class _Energies:
         return lag, frequency
 
 
+class FrequencyRows:
+    """The frequency that each sensor sees by itself, by increments, beside the diagnostics of a filter.
+
+    Sensors whose rate does not fit the lags, a multiple of 2 kHz, have none.
+
+    Parameters
+    ----------
+    belief : mapping of str to SensorBelief
+        Noise of each sensor.
+    sample_rate_hz : mapping of str to float
+        Their rates [Hz], in whole ratios.
+    """
+
+    def __init__(self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float]) -> None:
+        fastest = max(sample_rate_hz.values(), default=1.0)
+        self._sensors = {
+            name: (_Energies(belief[name], rate, MEMORY_S, MARGIN), round(fastest / rate))
+            for name, rate in sample_rate_hz.items()
+            if fits_lags(rate)
+        }
+        self._sample = 0
+
+    def process(self, readings: Mapping[str, FloatArray], n_time: int) -> dict[str, FloatArray]:
+        """Return ``frequency_<sensor>`` over the next block [Hz], NaN between readings and without a signal.
+
+        Parameters
+        ----------
+        readings : mapping of str to ndarray, shape (n_sensor_samples,)
+            Readings that are due in the block [rad/s]; not finite means none.
+        n_time : int
+            Its length, at the fastest rate.
+        """
+        rows = self.blank(n_time)
+        for name, (means, stride) in self._sensors.items():
+            row = rows[f"{FREQUENCY}{name}"][-self._sample % stride :: stride]
+            for first in range(0, row.size, BLOCK):
+                part = slice(first, first + BLOCK)
+                _, row[part] = means.choose(*means.process(readings[name][part]))
+        self._sample += n_time
+        return rows
+
+    def blank(self, n_time: int) -> dict[str, FloatArray]:
+        """Return a block of that length in which all is undefined."""
+        return {f"{FREQUENCY}{name}": np.full(n_time, np.nan) for name in self._sensors}
+
+
 class FrequencyIndicator:
     r"""Frequency of the signal from two sensors, online, the same for every amplitude.
 
@@ -203,8 +260,8 @@ class FrequencyIndicator:
         belief: Mapping[str, SensorBelief],
         sample_rate_hz: Mapping[str, float],
         *,
-        memory: float = 1.0,
-        margin: float = 1.0,
+        memory: float = MEMORY_S,
+        margin: float = MARGIN,
     ) -> None:
         if not (memory > 0.0 and margin >= 0.0):
             msg = f"memory, margin: expected above 0 s and at least 0, got {memory:g} and {margin:g}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -14,6 +14,7 @@ from testbed.fusion.filters.kalman import KalmanParameters
 from testbed.fusion.kernels.literature import imm_kernel
 from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import FilterParameters, initial_state
+from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, PositiveDuration
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Imm(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = ImmParameters
+    any_clock = True
     start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
@@ -84,10 +86,12 @@ class Imm(BlockFilter):
             use_input_noise=parameters.use_input_noise,
             coloured=parameters.coloured,
             start=parameters.start,
+            any_ratio=True,
         )
-        # The models differ in Q alone, and there in the part that is proportional to q.
-        self.model, calmest = built(q=parameters.q), built(q=0.0).Q
-        self._Q = np.array([calmest + ratio * (self.model.Q - calmest) for ratio in parameters.ratios])
+        self.model, self._calmest, self._ratios = built(q=parameters.q), built(q=0.0), parameters.ratios
+        self._Q = self._mixed(self.model.Q, self._calmest.Q)
+        self._even = even(self.model.F, self._Q)
+        self._nodes: tuple[FloatArray, FloatArray] | None = None
         if not np.all(self.model.R > 0.0):
             msg = f"belief: expected an output_noise above 0 for each of {list(self.model.sensors)}"
             raise ValueError(msg)
@@ -104,7 +108,20 @@ class Imm(BlockFilter):
         count, n = self._X.shape
         return 1e-7 + 2e-9 * float(count * (2 + count) * n**2)
 
-    # Its chain steps regularly.
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
+    def _mixed(self, usual: FloatArray, calmest: FloatArray) -> FloatArray:
+        """Return Q of each model: they differ in the part alone that is proportional to q."""
+        return np.array([calmest + ratio * (usual - calmest) for ratio in self._ratios])
+
+    def _clocked(self, steps: Steps) -> tuple[Any, ...]:
+        """Return `steps` and the tables as the kernel takes them."""
+        if steps is EVEN:
+            return self._even
+        if self._nodes is None:
+            A, step = self.model.A, 1.0 / self.model.sample_rate_hz
+            F, usual = transition_nodes(A, self.model.Qc, step)
+            self._nodes = F, self._mixed(usual, transition_nodes(A, self._calmest.Qc, step)[1])
+        return (*steps, *self._nodes)
+
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
         model, chain = (self.model.F, self._Q, self.model.H, self.model.R), (self._stay, self._mu, self._started)
-        self._started = imm_kernel(self._X, self._P, *model, *chain, Z, out)
+        self._started = imm_kernel(self._X, self._P, *model, *chain, Z, self._clocked(steps), out)

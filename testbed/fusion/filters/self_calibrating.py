@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
+from testbed.errors import quoted, shortened
 from testbed.fusion.analysis.calibration import Calibrated, Calibration
+from testbed.fusion.analysis.indicator import FrequencyRows
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
 from testbed.fusion.belief import SensorBelief
 from testbed.fusion.kernels.covariance import HEADER_ROWS
@@ -34,8 +36,10 @@ _INNER = {
 # The lag of a sensor without any [s], so that there always is a state of it. The estimate leads by it: 10 us would cost
 # 15 % on the jitter of a wheel.
 _LEAST_LAG = 1e-6
-# From this change of gain [-] and lag [s] on the last seconds, as many at the most, are filtered again.
-_GAIN_CHANGE, _LAG_CHANGE, _AGAIN = 5e-4, 2e-5, 10
+# From this change of gain [-] and lag [s] on, and from this share of their standard deviations on, the last seconds, as
+# many at the most, are filtered again: less is no news, and each time costs as much as these seconds did.
+_GAIN_CHANGE, _LAG_CHANGE, _NEWS, _AGAIN = 5e-4, 2e-5, 0.5, 10
+_MOST_FINDINGS = 5
 _OWN = ("gain", "gain_std", "delay", "delay_std")
 
 
@@ -88,12 +92,13 @@ class SelfCalibratingParameters(CommonParameters):
     def _check_filter(cls, value: dict[str, dict[str, Any]], info: ValidationInfo) -> dict[str, dict[str, Any]]:
         ((name, given),) = value.items()
         if name not in _INNER:
-            msg = f"expected one of {list(_INNER)}, which can go on with another belief, got {name!r}"
+            msg = f"expected one of {list(_INNER)}, which can go on with another belief, got {quoted(name)}"
             raise ValueError(msg)
         try:
             inner = _inner_class(name).Parameters.model_validate(given, context=info.context)
         except ValidationError as error:
-            msg = "; ".join(f"{name}.{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+            found = [f"{name}.{shortened('.'.join(map(str, one['loc'])))}: {one['msg']}" for one in error.errors()]
+            msg = "; ".join(found[:_MOST_FINDINGS])
             raise ValueError(msg) from error
         if isinstance(inner, FilterParameters) and inner.order == 1:
             msg = f"{name}: expected order 2 or 3, since one of order 1 cannot extrapolate over a delay"
@@ -146,6 +151,7 @@ class SelfCalibrating(BlockFilter):
         common = parameters.model_dump(include={"start", "rest_rate"})
         self._inner_parameters = _inner_class(self._name).Parameters(**{**common, **given, "gate": False})
         self._rates = dict(sample_rate_hz)
+        self.frequency = FrequencyRows(belief, sample_rate_hz)
         self._belief = {name: LateBelief(**belief[name].model_dump() | {"lag": _LEAST_LAG}) for name in sample_rate_hz}
         self._inner = self._built(self._belief)
         self.rows = Rows((*_OWN, *self._inner.rows.once), self._inner.rows.per_sensor)
@@ -218,7 +224,9 @@ class SelfCalibrating(BlockFilter):
         lags = np.full(2, _LEAST_LAG)
         lags[self._noisy if delay > 0.0 else self._clean] += abs(delay)
         change = float(np.max(np.abs(lags - self._lags)))
-        if abs(gain - self._gain) < _GAIN_CHANGE and change < _LAG_CHANGE:
+        least_gain = max(_GAIN_CHANGE, _NEWS * self._known.gain_std)
+        least_lag = max(_LAG_CHANGE, _NEWS * self._known.delay_std)
+        if abs(gain - self._gain) < least_gain and change < least_lag:
             return
         self._gain, self._lags = gain, lags
         belief = {

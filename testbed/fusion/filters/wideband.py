@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from testbed.fusion.analysis.indicator import FrequencyRows
 from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.kernels.covariance import JOSEPH, NODES
@@ -96,6 +97,7 @@ class Wideband(ModelFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: WidebandParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
+        self.frequency = FrequencyRows(belief, sample_rate_hz)
         q = parameters.q * np.logspace(0.0, parameters.decades, parameters.filters)
         self._R = self.measurement_noise("R", {}, explicit=False)
         self._Q = self._noise_of_bank(belief, sample_rate_hz, parameters, q)

@@ -981,12 +981,13 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
 
 @functools.lru_cache
 def gains_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:
-    """Return run(P, F, Q, H, R, due, started, gains, variance, std), the covariance of `kalman_kernel` without any
-    reading.
+    """Return run(P, F, Q, H, R, due, started, gains, variance, std) -> widest, the covariance of `kalman_kernel`
+    without any reading.
 
     P (n, n), in Joseph form, is replaced; `due` (n_sensor, n_time) says which readings there are. `gains` (n_time,
     n_sensor, n), `variance` (n_time, n_sensor) of the innovations and `std` (n_time,) of the rate are filled where
-    there are some. Many states with the same gaps share them.
+    there are some. Many states with the same gaps share them, as long as the rate is not recalled: `widest` is its
+    largest variance before a reading [rad^2/s^2].
     """
     states, readings, fast = n, n_sensor, n - n_slow
 
@@ -1007,9 +1008,11 @@ def gains_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:
         spans(F, core, n, reach)
         spans(H, 0, core, seen[:, :2])
         spans(H, core, n, seen[:, 2:])
+        widest = 0.0
         for k in range(std.size):
             if started:
                 predict(x, P, F, Q, reach, work, moved, n, core)
+                widest = max(widest, P[0, 0])
             for i in range(n_sensor):
                 if due[i, k]:
                     variance[k, i] = innovation(x, P, H, seen, i, 0.0, g, n, core)[1] + R[i]
@@ -1021,5 +1024,6 @@ def gains_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:
                         gains[k, i, j] = K[j]
             std[k] = np.sqrt(P[0, 0])
         P_in[:] = P
+        return widest
 
     return run

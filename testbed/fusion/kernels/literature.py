@@ -3,7 +3,7 @@
 Numba's disk cache watches the file of a kernel alone, so that what both call stands here too, as in
 `testbed.fusion.kernels.covariance`, with which it shares numbers but no code. Readings come as one row per sensor at
 the fastest rate: NaN where none is due, infinite where one is missing. Both mean: predict only. Until the first reading
-nothing is predicted either.
+nothing is predicted either. `clocked` = (node, share, whole, F, Q) says how steps of any length are reached, as there.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from testbed.fusion.kernels.covariance import HEADER_ROWS, LOST_VARIANCE, RATE, STD
+from testbed.fusion.kernels.covariance import HEADER_ROWS, LOST_VARIANCE, NODES, RATE, STD
 
 # Rows of a sensor behind those that stand once: innovation, its variance; for the first filter R too.
 VB_ROWS, IMM_ROWS = 3, 2
@@ -52,6 +52,16 @@ def predict_dense(x, P, F, Q, work, moved):  # pragma: no cover
             for k in range(j + 1):
                 P[j, k] -= share * spread * moved[j] * moved[k]
                 P[k, j] = P[j, k]
+
+
+@njit(cache=True, error_model="numpy")
+def between_dense(M, table, j, s):  # pragma: no cover
+    """Set M = (1 - s) table[j] + s table[j + 1]."""
+    for a in range(M.shape[0]):
+        for b in range(M.shape[1]):
+            M[a, b] = table[j, a, b]
+            if s != 0.0:
+                M[a, b] += s * (table[j + 1, a, b] - table[j, a, b])
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,7 +112,7 @@ def any_reading(Z, k):  # pragma: no cover
 
 
 @njit(cache=True, error_model="numpy")
-def vb_akf_kernel(x, P, F, Q, H, alpha, beta, forget, iterations, started, Z, out):  # pragma: no cover
+def vb_akf_kernel(x, P, F_in, Q_in, H, alpha, beta, forget, iterations, started, Z, clocked, out):  # pragma: no cover
     """Run the variational-Bayes adaptive filter over a block; return whether there was a reading so far.
 
     x, P, and alpha, beta (n_sensor,) of the inverse gamma distribution of each R are replaced by those of the last
@@ -112,8 +122,17 @@ def vb_akf_kernel(x, P, F, Q, H, alpha, beta, forget, iterations, started, Z, ou
     work, moved, g, K = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
     x_prior, P_prior = np.empty(n), np.empty((n, n))
     before = np.empty(n_sensor)
+    node, share, whole, F_between, Q_between = clocked
+    F, Q, at, part = F_in.copy(), Q_in.copy(), -1, 0.0
     for k in range(Z.shape[1]):
-        if started:
+        turns = whole[k] + 1 if node.size > 0 else 1
+        for turn in range(turns if started else 0):
+            if node.size > 0:
+                j, s = (NODES, 0.0) if turn < turns - 1 else (node[k], share[k])
+                if at != j or part != s:
+                    between_dense(F, F_between, j, s)
+                    between_dense(Q, Q_between, j, s)
+                    at, part = j, s
             predict_dense(x, P, F, Q, work, moved)
         if any_reading(Z, k):
             started = True
@@ -174,19 +193,31 @@ def interact(X, P, stay, mu, X_old, P_old):  # pragma: no cover
 
 
 @njit(cache=True, error_model="numpy")
-def imm_kernel(X, P, F, Q, H, R, stay, mu, started, Z, out):  # noqa: PLR0912  # pragma: no cover
+def imm_kernel(X, P, F_in, Q_in, H, R, stay, mu, started, Z, clocked, out):  # noqa: PLR0912  # pragma: no cover
     """Run the interacting multiple model over a block; return whether there was a reading so far.
 
     X (n_model, n), P (n_model, n, n) and mu (n_model,) are replaced by those of the last step; the models differ in
-    Q (n_model, n, n). `out` receives rate, std, the probability of each model, and per sensor innovation and its
-    variance.
+    Q (n_model, n, n), as in the tables between stamps. `out` receives rate, std, the probability of each model, and per
+    sensor innovation and its variance.
     """
     (n_model, n), n_sensor = X.shape, Z.shape[0]
     work, moved, g, K = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
     X_old, P_old, likelihood = np.empty((n_model, n)), np.empty((n_model, n, n)), np.empty(n_model)
+    node, share, whole, F_between, Q_between = clocked
+    F, Q, at, part, stays = F_in.copy(), Q_in.copy(), -1, 0.0, stay
     for k in range(Z.shape[1]):
-        if started:
-            interact(X, P, stay, mu, X_old, P_old)
+        turns = whole[k] + 1 if node.size > 0 else 1
+        for turn in range(turns if started else 0):
+            if node.size > 0:
+                j, s = (NODES, 0.0) if turn < turns - 1 else (node[k], share[k])
+                if at != j or part != s:
+                    between_dense(F, F_between, j, s)
+                    for m in range(n_model):
+                        between_dense(Q[m], Q_between[m], j, s)
+                    span = (j + s) / NODES
+                    stays = stay if span == 1.0 else stay**span
+                    at, part = j, s
+            interact(X, P, stays, mu, X_old, P_old)
             for j in range(n_model):
                 predict_dense(X[j], P[j], F, Q[j], work, moved)
         if any_reading(Z, k):

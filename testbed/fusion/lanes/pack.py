@@ -12,7 +12,9 @@ from testbed.fusion.lanes.source import LANES, Pattern
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from testbed.fusion.base import BlockFilter
     from testbed.fusion.base import Received as Block
+    from testbed.fusion.filters.steady_state import SteadyState
     from testbed.fusion.model_filter import ModelFilter
     from testbed.signals import FloatArray
 
@@ -35,9 +37,9 @@ def padded(pack: Sequence[int]) -> list[int]:
     return [*pack, *[pack[-1]] * (LANES - len(pack))]
 
 
-def pattern_of(one: ModelFilter) -> Pattern:
+def pattern_of(one: ModelFilter | SteadyState) -> Pattern:
     """Return where the matrices of a filter are not zero, and when it is read."""
-    F, H = (tuple(tuple(np.flatnonzero(row).tolist()) for row in matrix) for matrix in (one._F, one._H))
+    F, H = (tuple(tuple(np.flatnonzero(row).tolist()) for row in matrix) for matrix in (one.model.F, one.model.H))
     return Pattern(F, H, one.schedule.strides)
 
 
@@ -73,13 +75,13 @@ class Buffers:
 
 
 def block_of(
-    one: ModelFilter, rate: FloatArray, std: FloatArray, innovation: FloatArray, variance: FloatArray, gated: FloatArray
+    one: BlockFilter, rate: FloatArray, std: FloatArray, innovation: FloatArray, variance: FloatArray, gated: FloatArray
 ) -> EstimateBlock:
     """Return the estimate of a lane with the diagnostics that its judge looks at.
 
     Parameters
     ----------
-    one : ModelFilter
+    one : BlockFilter
         Whose it is.
     rate, std : ndarray, shape (n_time,)
         Estimate and claim [rad/s].

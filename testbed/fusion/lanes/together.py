@@ -11,9 +11,11 @@ import numpy as np
 
 from testbed.fusion.filters.kalman import Kalman
 from testbed.fusion.filters.shakf import SageHusa
+from testbed.fusion.filters.steady_state import SteadyState
 from testbed.fusion.kernels.covariance import JOSEPH
 from testbed.fusion.lanes.adaptive import AdaptiveLanes
-from testbed.fusion.lanes.shared import SharedLanes
+from testbed.fusion.lanes.settling import SettlingGains
+from testbed.fusion.lanes.shared import KalmanGains, SharedLanes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +40,9 @@ class Together:
     def __init__(self, example: BlockFilter) -> None:
         self._lanes: SharedLanes | AdaptiveLanes | None = None
         if isinstance(example, Kalman) and _plain(example):
-            self._lanes = SharedLanes(example)
+            self._lanes = SharedLanes(example, KalmanGains)
+        elif isinstance(example, SteadyState):
+            self._lanes = SharedLanes(example, SettlingGains)
         elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
             self._lanes = AdaptiveLanes(example)
 

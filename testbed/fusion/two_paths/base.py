@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
+from testbed.fusion.kernels.covariance import NODES
 from testbed.fusion.model import build_model
+from testbed.fusion.schedule import even_rates
 from testbed.fusion.start import REST_STD, constant_response, unknown_spread
+from testbed.fusion.transitions import EVEN, N_NODE, Steps
 from testbed.fusion.two_paths.design import (
     BAND_ORDER,
     HIGH_HZ,
@@ -33,7 +36,7 @@ from testbed.fusion.two_paths.paths import parallel
 from testbed.units import Frequency, Range
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from testbed.fusion.belief import SensorBelief
     from testbed.fusion.model import FusionModel
@@ -97,6 +100,10 @@ class TwoPaths(BlockFilter):
     such a sine departs from its value, until the slow path alone is better and is followed. While the slow one is
     missing the fast one is integrated and its drift added.
 
+    Where readings have stamps, or rates of another ratio, each path moves by its exact transition: the slow one to its
+    own readings, the fast one and the loop at those of the fast sensor. The design is that of the nearest whole ratio,
+    and the claim the mean over its cycle.
+
     Parameters
     ----------
     belief : mapping of str to SensorBelief
@@ -114,6 +121,7 @@ class TwoPaths(BlockFilter):
     """
 
     Parameters: ClassVar[type[Part]] = TwoPathParameters
+    any_clock = True
     needs_both = True
     # Of the low-pass L at a crossover that is given.
     order: ClassVar[int]
@@ -123,7 +131,8 @@ class TwoPaths(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: TwoPathParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        self.model = build_model(belief, sample_rate_hz, order=1, q=0.0)
+        even = sample_rate_hz if self.schedule.even else even_rates(sample_rate_hz)
+        self.model = build_model(belief, even, order=1, q=0.0)
         self.model.check_cycle()
         _refuse_delay({name: belief[name] for name in self.model.sensors})
         self._slow, self._fast = _roles(belief, self.model)
@@ -165,13 +174,16 @@ class TwoPaths(BlockFilter):
             return whole + noise_variance(paths, self.model, self._slow, self._fast)
 
         self.bandwidth_hz = parameters.bandwidth or _best_bandwidth(candidate, self.model.sample_rate_hz)
-        self._settled = candidate(self.bandwidth_hz)
+        settled = candidate(self.bandwidth_hz)
+        # Readings of another ratio never repeat.
+        self._settled = settled if self.schedule.even else settled.mean(keepdims=True)
         band = band_end(slow, fast, 2.0 * math.pi * self.bandwidth_hz)
         T = 1.0 / self.model.sample_rate_hz
         beginning = _beginning(slow, inverted(slow, alone_band))
-        of_fast, of_slow = (_stepped(inverted(*one), T) for one in ((fast, band), (slow, alone_band)))
-        self._paths = of_fast, (*of_slow, beginning.modes)
-        self._x = tuple(np.zeros(path[0].shape[0]) for path in self._paths)
+        self._inverses = inverted(fast, band), inverted(slow, alone_band)
+        of_fast, of_slow = (_stepped(one, [T]) for one in self._inverses)
+        self._paths: tuple[tuple[Any, ...], ...] = (of_fast, (*of_slow, beginning.modes))
+        self._x = tuple(np.zeros(path[0].shape[1]) for path in self._paths)
         fading = -math.expm1(-loop.leak * T) / loop.leak if loop.leak else T
         rest = parameters.start == "rest"
         spread = unknown_spread([belief[name] for name in self.model.sensors])
@@ -213,19 +225,30 @@ class TwoPaths(BlockFilter):
             self.order, best_crossover(slow, fast, self.order, freq_hz, float(lag.of(np.array([freq_hz]))[0]))
         )
 
-    # Its paths step at regular steps only.
-    def _advance(self, Z: FloatArray, out: FloatArray) -> None:  # type: ignore[override]
-        two_paths(*self._x, *self._paths, self._memory, self._settled, self._setting, Z[self._fast], Z[self._slow], out)
+    def _advance(self, Z: FloatArray, out: FloatArray, steps: Steps = EVEN) -> None:
+        if steps is not EVEN and len(self._paths[0][0]) == 1:
+            T = 1.0 / self.model.sample_rate_hz
+            spans = np.arange(N_NODE) / NODES * T
+            # To the bit what a filter of regular steps has.
+            spans[NODES] = T
+            between = (_stepped(one, spans) for one in self._inverses)
+            self._paths = tuple((*new[:3], *old[3:]) for new, old in zip(between, self._paths, strict=True))
+        memory = (self._memory, self._settled, self._setting)
+        two_paths(*self._x, *self._paths, *memory, Z[self._fast], Z[self._slow], steps, out)
 
 
-def _stepped(path: Realisation, T: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float, FloatArray]:
-    """Return (Phi, Gamma, ramp, C, D, still) of a path over a step T [s], exact for an input linear between samples."""
+def _stepped(path: Realisation, spans: Sequence[float] | FloatArray) -> tuple[Any, ...]:
+    """Return (Phi, Gamma, ramp, C, D, still) of a path, the first three for each length of a step [s], exact for an
+    input linear between samples.
+    """
     n = path.B.size
-    block = np.zeros((n + 2, n + 2))
-    block[:n, :n], block[:n, n], block[n, n + 1] = path.A * T, path.B * T, 1.0
-    power = expm(block)
-    still = constant_response(path.A, path.B)
-    return power[:n, :n].copy(), power[:n, n].copy(), power[:n, n + 1].copy(), path.C, path.D, still
+    powers = np.empty((len(spans), n + 2, n + 2))
+    for power, span in zip(powers, spans, strict=True):
+        block = np.zeros((n + 2, n + 2))
+        block[:n, :n], block[:n, n], block[n, n + 1] = path.A * span, path.B * span, 1.0
+        power[:] = expm(block)
+    matrices = (powers[:, :n, :n].copy(), powers[:, :n, n].copy(), powers[:, :n, n + 1].copy())
+    return (*matrices, path.C, path.D, constant_response(path.A, path.B))
 
 
 def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int, int]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from testbed.parts import Part
 from testbed.units import Angle, Quantity
+
+if TYPE_CHECKING:
+    from testbed.signals import FloatArray
 
 # WGS 84 (NIMA TR8350.2), Table 3.1 [rad/s].
 SPEED = 7.292115e-5
@@ -34,3 +37,16 @@ class EarthRate(Part):
         """Return the Earth's rate in the laboratory's x, y, z (up) [rad/s]."""
         level, up = SPEED * np.cos(self.latitude), SPEED * np.sin(self.latitude)
         return float(level * np.cos(self.azimuth)), float(level * np.sin(self.azimuth)), float(up)
+
+    def along(self, axis: FloatArray) -> FloatArray:
+        """Return the Earth's rate along an axis of the laboratory, shape (n_time,) [rad/s].
+
+        Parameters
+        ----------
+        axis : ndarray, shape (3, n_time)
+            Unit vectors [-].
+        """
+        x, y, z = self.vector
+        # No matrix product: its order of additions depends on the length of the block.
+        rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
+        return rate

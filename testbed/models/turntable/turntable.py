@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -14,57 +13,19 @@ from testbed.models.turntable import plant, servo, stepping
 from testbed.models.turntable.digital import DigitalLoop, check_loop
 from testbed.models.turntable.disturbances import Disturbances, check_floor
 from testbed.models.turntable.engine import Engine
+from testbed.models.turntable.fixed import FixedBase
 from testbed.models.turntable.modal import ModalEngine, check_modal
+from testbed.models.turntable.truth import TruthBlock
 from testbed.signals import BASE_RATE_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from testbed.models.motion import CommandBlock
-    from testbed.models.turntable.earth import EarthRate
     from testbed.models.turntable.floor import FloorMotion
     from testbed.models.turntable.parameters import Mounting, TurntableParameters
+    from testbed.models.turntable.truth import Poses
     from testbed.signals import FloatArray
-
-    Poses = dict[str, tuple[FloatArray, FloatArray]]
-
-
-@dataclass(frozen=True)
-class TruthBlock:
-    """What the table really did over `n_time` steps, at t_k = k / sample_rate for k = start ... start + n_time - 1.
-
-    Parameters
-    ----------
-    start : int
-        Index k of the first sample.
-    rate : ndarray, shape (n_time,)
-        Inertial rate about the rotor's axis [rad/s], the same at every point of the rotor; with the Earth's if asked
-        for.
-    angle : ndarray, shape (n_time,)
-        Angle about the vertical, spindle plus platform yaw, not wrapped [rad]; without the Earth's.
-    sensor_rate : dict of str to ndarray, shape (n_time,)
-        What each sensor's own axis feels [rad/s].
-    encoder_rate : ndarray, shape (n_time,)
-        Rate of the rotor relative to the platform [rad/s]: differs from `rate` by the recoil of the platform.
-    torque : ndarray, shape (n_time,)
-        Motor torque [N m].
-    poses : dict of str to tuple of ndarray, shapes (n_pose, 3), (n_pose, 4)
-        Body name to positions [m] and unit quaternions (w, x, y, z) at the samples with k % pose_stride == 0.
-    cross_rate : dict of str to ndarray, shape (n_time, 2)
-        Inertial rates about the housing's x and y axes [rad/s], of the exposed sensors.
-    specific_force : dict of str to ndarray, shape (n_time, 3)
-        Acceleration minus gravity at the mounting along the housing's axes [m/s^2], of the exposed sensors.
-    """
-
-    start: int
-    rate: FloatArray
-    angle: FloatArray
-    sensor_rate: dict[str, FloatArray]
-    encoder_rate: FloatArray
-    torque: FloatArray
-    poses: Poses
-    cross_rate: dict[str, FloatArray] = field(default_factory=dict)
-    specific_force: dict[str, FloatArray] = field(default_factory=dict)
 
 
 class Turntable:
@@ -148,8 +109,7 @@ class Turntable:
             Disturbances(self.model, parameters, floor, sample_rate_hz) if parameters.has_plant else None
         )
         self._address = self._modal_outputs() if modal else self._all_sensors()
-        # The axis of each site on the table at angle 0: what turns with it in mode `fixed`.
-        self._axes = {name: plant.rotation(self.model.site(name).quat)[:, 2] for name in (plant.AXIS, *mountings)}
+        self._base = FixedBase(self.model, parameters, mountings, self._dt)
 
     def process(self, command: CommandBlock, ahead: CommandBlock | None = None) -> TruthBlock:
         """Follow the command over its steps.
@@ -254,41 +214,21 @@ class Turntable:
         )
 
     def _fixed(self, command: CommandBlock) -> TruthBlock:
-        rate, angle = command.rate[:-1].copy(), command.angle[:-1].copy()
-        # A rate about the vertical, seen along a tilted axis.
-        felt = {name: axis[2] * rate for name, axis in self._axes.items()}
-        if self.parameters.earth_rate is not None:
-            for name, axis in self._axes.items():
-                felt[name] += _along(self.parameters.earth_rate, _turned(axis, angle))
-        surroundings = {name: self._fixed_surroundings(name, command) for name in self._exposed}
+        base = self._base
+        felt = {name: base.rate(name, command) for name in (plant.AXIS, *self._names)}
+        around = {name: base.surroundings(name, command) for name in self._exposed}
+        angle = command.angle[:-1].copy()
         return TruthBlock(
             start=command.start,
             rate=felt.pop(plant.AXIS),
             angle=angle,
             sensor_rate=felt,
-            encoder_rate=rate,
+            encoder_rate=command.rate[:-1].copy(),
             torque=np.zeros(command.n_time),
             poses=self._poses(angle[-command.start % self._stride :: self._stride, None]),
-            cross_rate={name: cross for name, (cross, _) in surroundings.items()},
-            specific_force={name: force for name, (_, force) in surroundings.items()},
+            cross_rate={name: cross for name, (cross, _) in around.items()},
+            specific_force={name: force for name, (_, force) in around.items()},
         )
-
-    def _fixed_surroundings(self, name: str, command: CommandBlock) -> tuple[FloatArray, FloatArray]:
-        """Return cross rates and specific force of a mounting that turns about the vertical and does nothing else."""
-        x, y, _ = self._mountings[name].position
-        rate, acceleration = command.rate[:-1], np.diff(command.rate) / self._dt
-        force = [
-            -acceleration * y - rate**2 * x,
-            acceleration * x - rate**2 * y,
-            np.full(rate.size, self.parameters.gravity),
-        ]
-        to_table = plant.rotation(self.model.site(name).quat)
-        turned: FloatArray = (to_table.T[:, :, None] * np.array(force)).sum(axis=1).T
-        cross: FloatArray = rate[:, None] * to_table[2, :2]
-        if self.parameters.earth_rate is not None:
-            for i in range(2):
-                cross[:, i] += _along(self.parameters.earth_rate, _turned(to_table[:, i], command.angle[:-1]))
-        return cross, turned
 
     def _start_long(self, command: CommandBlock, control: FloatArray) -> stepping.LongSteps:
         data, qvel = self._at_start(command)
@@ -348,7 +288,7 @@ class Turntable:
         rate = self._column(f"rate_{site}", rows)
         if self.parameters.earth_rate is not None:
             first = self._address[f"axis_{site}"]
-            rate += _along(self.parameters.earth_rate, rows[:, first : first + 3].T)
+            rate += self.parameters.earth_rate.along(rows[:, first : first + 3].T)
         return rate
 
     def _cross_rate(self, site: str, rows: FloatArray) -> FloatArray:
@@ -356,7 +296,7 @@ class Turntable:
         cross = self._columns(f"rate_{site}", rows)[:, :2]
         if self.parameters.earth_rate is not None:
             for i, axis in enumerate(("axis_x", "axis_y")):
-                cross[:, i] += _along(self.parameters.earth_rate, self._columns(f"{axis}_{site}", rows).T)
+                cross[:, i] += self.parameters.earth_rate.along(self._columns(f"{axis}_{site}", rows).T)
         return cross
 
     def _column(self, sensor: str, rows: FloatArray) -> FloatArray:
@@ -420,18 +360,3 @@ def check_plant(parameters: TurntableParameters, sample_rate_hz: float, substeps
     check_floor(parameters, sample_rate_hz)
     if parameters.mode == "digital":
         check_loop(parameters, sample_rate_hz)
-
-
-def _along(earth: EarthRate, axis: FloatArray) -> FloatArray:
-    """Return the Earth's rate along an axis, shape (3, n_time); shape (n_time,). MuJoCo's laboratory does not turn."""
-    x, y, z = earth.vector
-    # No matrix product: its order of additions depends on the length of the block.
-    rate: FloatArray = axis[0] * x + axis[1] * y + axis[2] * z
-    return rate
-
-
-def _turned(axis: FloatArray, angle: FloatArray) -> FloatArray:
-    """Return an axis, shape (3,), turned about the vertical by angles, shape (n_time,); shape (3, n_time)."""
-    x, y, z = axis
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([c * x - s * y, s * x + c * y, np.full_like(c, z)])

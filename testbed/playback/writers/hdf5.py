@@ -24,9 +24,9 @@ def write_hdf5(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
     with h5py.File(folder / FILE, "w") as file:
         for track in tracks:
             group = file.create_group(track.name)
-            group.attrs["sample_rate_hz"] = track.sample_rate_hz
-            time = group.create_dataset("time", (track.n_time,), np.int64)
-            rate = group.create_dataset("rate", (track.n_time,), np.float64)
+            group.attrs["sample_rate_hz"] = track.signals.sample_rate_hz
+            time = group.create_dataset("time", (track.signals.n_time,), np.int64)
+            rate = group.create_dataset("rate", (track.signals.n_time,), np.float64)
             time.attrs["units"], rate.attrs["units"] = "ns", "rad/s"
             start = 0
             for stamps, values in track.blocks():

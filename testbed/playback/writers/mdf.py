@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.playback.track import NANO
+from testbed.logs.clock import NANO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

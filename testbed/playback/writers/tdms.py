@@ -21,7 +21,11 @@ def write_tdms(folder: Path, tracks: Sequence[Track]) -> dict[str, dict[str, str
 
     with TdmsWriter(str(folder / FILE)) as file:
         for track in tracks:
-            waveform = {"wf_increment": 1.0 / track.sample_rate_hz, "wf_start_offset": 0.0, "unit_string": "rad/s"}
+            waveform = {
+                "wf_increment": 1.0 / track.signals.sample_rate_hz,
+                "wf_start_offset": 0.0,
+                "unit_string": "rad/s",
+            }
             for stamps, rate in track.blocks():
                 times = ChannelObject(track.name, "t", stamps, properties={"unit_string": "ns"})
                 file.write_segment([times, ChannelObject(track.name, track.name, rate, properties=waveform)])

@@ -36,6 +36,7 @@ COLORS = {name: palette.color_of(f"sensors/{name}") for name in SENSORS} | {
     "rate": palette.color_of("truth"),
 }
 LABELS = {"mems_gyro": "MEMS gyro", "mhd_ars": "MHD ARS", "fused": "fused", "rate": "true rate"}
+BELIEVED = {"color": INK, "linewidth": 0.9, "linestyle": LIMIT}
 FOLLOWED_HZ = {"figure_7": 0.5, "figure_8": 5.0, "figure_9": 50.0}
 SHOWN_PERIODS, BEFORE_S = 3.0, 1.0
 
@@ -100,9 +101,10 @@ def draw_both_responses(table: Table) -> Figure:
     """Draw figure 2 from the table of `both_responses`."""
     figure, (gain, phase) = panels(4.2, 2)
     for name in SENSORS:
-        for suffix, style in (("", {"linewidth": 1.3}), ("_believed", {"linewidth": 1.0, "linestyle": LIMIT})):
-            gain.plot(table["frequency_hz"], table[f"{name}{suffix}_gain"], color=COLORS[name], **style)
-            phase.plot(table["frequency_hz"], table[f"{name}{suffix}_phase_deg"], color=COLORS[name], **style)
+        # The belief lies on the sensor: dashed in ink over a wide line, so that both are seen.
+        for of, style in ((name, {"color": COLORS[name], "linewidth": 2.4}), (f"{name}_believed", BELIEVED)):
+            gain.plot(table["frequency_hz"], table[f"{of}_gain"], **style)
+            phase.plot(table["frequency_hz"], table[f"{of}_phase_deg"], **style)
     logarithmic(gain, "xy")
     logarithmic(phase, "x")
     gain.set_ylabel("gain [-]")
@@ -111,7 +113,7 @@ def draw_both_responses(table: Table) -> Figure:
     phase.set_xlabel("frequency [Hz]")
     phase.set_xlim(table["frequency_hz"][0], table["frequency_hz"][-1])
     names = [key(LABELS[name], color=COLORS[name]) for name in SENSORS]
-    legend(figure, [*names, key("believed", color=INK, linestyle=LIMIT)], 3)
+    legend(figure, [*names, key("believed", **BELIEVED)], 3)
     return figure
 
 
@@ -127,7 +129,7 @@ def draw_followed(table: Table) -> Figure:
     error.set_ylabel("fused - true [deg/s]")
     in_time(error, table["t"])
     names = [key(LABELS[name], color=COLORS[name]) for name in ("rate", *SENSORS)]
-    legend(figure, [*names, key(LABELS["fused"], color=COLORS["fused"], linestyle=DOTTED)], 4)
+    legend(figure, [*names, key(LABELS["fused"], color=COLORS["fused"], linestyle=DOTTED)], 2)
     return figure
 
 

@@ -29,7 +29,7 @@ from testbed.reproduce.paper3.figures import Decomposed, write_figures_10_to_14
 from testbed.reproduce.paper3.page import page
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
-from testbed.sensors.base import Surroundings
+from testbed.sensors.stages import Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from testbed.fusion.analysis.indicator import LAGS_S, FrequencyIndicator, energies, noise_energies, turn
+from testbed.fusion.analysis.indicator import LAGS_S, FrequencyIndicator, FrequencyRows, energies, noise_energies, turn
 from testbed.fusion.belief import load_belief
 from testbed.signals import random_stream
 
@@ -154,3 +154,25 @@ def test_a_block_may_be_empty() -> None:
 def test_it_refuses_a_memory_or_margin_without_meaning(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="memory, margin: expected"):
         FrequencyIndicator(BELIEF, RATES, **wrong)
+
+
+def test_rows_are_those_of_each_sensor_at_its_readings_whatever_the_blocks() -> None:
+    """A sensor of 3 kHz does not fit the lags and has none."""
+    belief = BELIEF | {"odd": BELIEF["mems_gyro"]}
+    z = {name: sine(50.0, 0.1, round(0.2 * fs), fs) for name, fs in RATES.items()}
+    wanted = FrequencyIndicator(BELIEF, RATES).process(z).by_increments
+    rows = FrequencyRows(belief, RATES | {"odd": 3000.0}).process(z, 4000)
+    assert set(rows) == {"frequency_mems_gyro", "frequency_mhd_ars"} == set(FrequencyRows(BELIEF, RATES).blank(1))
+    assert np.array_equal(rows["frequency_mhd_ars"], wanted["mhd_ars"], equal_nan=True)
+    assert np.array_equal(rows["frequency_mems_gyro"][::10], wanted["mems_gyro"], equal_nan=True)
+    assert np.isnan(rows["frequency_mems_gyro"].reshape(-1, 10)[:, 1:]).all()
+    divided, parts = FrequencyRows(BELIEF, RATES), []
+    for a, b in ((0, 3), (3, 11), (11, 4000)):
+        given = {name: values[-(-a // step) : -(-b // step)] for name, step, values in _strided(z)}
+        parts.append(divided.process(given, b - a))
+    for key, row in rows.items():
+        assert np.array_equal(np.concatenate([part[key] for part in parts]), row, equal_nan=True)
+
+
+def _strided(z: dict[str, Any]) -> list[tuple[str, int, Any]]:
+    return [(name, round(20000.0 / RATES[name]), values) for name, values in z.items()]

@@ -147,6 +147,15 @@ def test_vb_akf_that_is_certain_of_its_variances_is_the_kalman_filter(readings):
     np.testing.assert_allclose(found.std, alone(readings).std, rtol=1e-6)
 
 
+def test_vb_akf_has_come_to_its_fixed_point_within_its_iterations(readings):
+    """Five leave nothing that fifty would change; the two that implementations take leave little."""
+    fixed = built("vb_akf", iterations=50).process(readings).rate
+    off = {n: np.std(built("vb_akf", iterations=n).process(readings).rate - fixed) / np.std(fixed) for n in (2, 5)}
+    print(off)
+    assert off[5] < 1e-5
+    assert off[2] < 1e-4
+
+
 def test_vb_akf_finds_a_variance_that_its_belief_does_not_have():
     """The readings of the MHD ARS ten times as noisy as believed: R is that, within the scatter of 2000 squares."""
     rng = np.random.default_rng(5)

@@ -11,6 +11,7 @@ import pytest
 
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import default_belief
+from testbed.fusion.kernels.covariance import EVERY, MODE, RECURSION, SETTLED
 from testbed.fusion.lanes import module
 from testbed.fusion.lanes.source import LANES
 from testbed.fusion.lanes.together import Together
@@ -72,6 +73,7 @@ CASES = [
     ("shakf", {"adapt": ("R", "Q")}),
     ("arw_shakf", {}),
     ("arw_shakf_literal", {}),
+    ("steady_state", {"frequency": 2.0}),
     ("complementary", {}),
 ]
 
@@ -88,7 +90,7 @@ def test_lanes_have_the_bits_of_the_kernel(name, parameters, n, rng):
             assert_same(a, b)
 
 
-@pytest.mark.parametrize("name", ["kalman", "arw_shakf", "shakf"])
+@pytest.mark.parametrize("name", ["kalman", "arw_shakf", "shakf", "steady_state"])
 def test_a_lane_of_its_own_fate_is_computed_alone(name, rng):
     """Lost readings, a spike beyond the gate, a sensor at its rail: in some lanes, in one block."""
     alone, lanes = filters(name, 5, gate=False), filters(name, 5, gate=False)
@@ -103,7 +105,27 @@ def test_a_lane_of_its_own_fate_is_computed_alone(name, rng):
             assert_same(a, b)
 
 
-@pytest.mark.parametrize("name", ["kalman", "arw_shakf"])
+def test_gains_that_settle_on_the_way_are_those_of_the_kernel(rng):
+    """Recursion, the cycle that is kept, settled gains, and the recursion again behind a gap."""
+    alone, lanes = (filters("steady_state", 3, frequency=2.0, coloured=False) for _ in range(2))
+    for one in (*alone, *lanes):
+        # A look at the gains with every cycle: they change little from one to the next.
+        one._progress[EVERY] = 1
+    together, seen = Together(lanes[0]), []
+    for number, given in enumerate(in_blocks(3, rng, [4000] * 5)):
+        if number == 3:
+            given[1]["mems_gyro"][9] = np.nan
+        expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
+        for a, b in zip(expected, process(together, lanes, given), strict=True):
+            assert_same(a, b)
+        for one, other in zip(alone, lanes, strict=True):
+            assert np.array_equal(one._progress, other._progress)
+            assert np.array_equal(one._last, other._last)
+        seen.append(int(lanes[0]._progress[MODE]))
+    assert {RECURSION, SETTLED} <= set(seen)
+
+
+@pytest.mark.parametrize("name", ["kalman", "arw_shakf", "steady_state"])
 def test_most_go_in_lanes(name, rng, monkeypatch):
     """All but those of their own fate: the sequential kernel is not asked for them."""
     lanes = filters(name, 5)

@@ -124,7 +124,7 @@ def test_exact_readings_of_a_sine_give_the_band_end(cls: Any, freq: float) -> No
     low, poles = low_pass(cls.order, 2.0 * np.pi * 2.0)
     share = np.polyval(low, s) / np.polyval(poles, s)
     # The slow path has a band end of its own, the best for it alone.
-    Phi, Gamma, _, C, D, *_ = found._paths[1]
+    (Phi,), (Gamma,), _, C, D, *_ = found._paths[1]
     z_step = np.exp(s / 20_000.0)
     alone = C @ np.linalg.solve(z_step * np.eye(len(C)) - Phi, Gamma) + D
     alone *= QUICK["mems_gyro"].realisation().response(np.array([freq]))[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from testbed.models.turntable import servo
 from testbed.models.turntable.digital import Controller, check_loop, closed_loop
 from testbed.models.turntable.parameters import Digital, Mounting, Ripple, TurntableParameters
 from testbed.models.turntable.servo import required_torque
-from testbed.models.turntable.turntable import TruthBlock, Turntable
+from testbed.models.turntable.turntable import Turntable
+
+if TYPE_CHECKING:
+    from testbed.models.turntable.truth import TruthBlock
 
 FS = 20000.0
 DT = 1.0 / FS

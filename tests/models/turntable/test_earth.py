@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from testbed.models.motion import MotionProfile
 from testbed.models.turntable.earth import SPEED, EarthRate
 from testbed.models.turntable.parameters import Mounting, TurntableParameters
-from testbed.models.turntable.turntable import TruthBlock, Turntable
+from testbed.models.turntable.turntable import Turntable
+
+if TYPE_CHECKING:
+    from testbed.models.turntable.truth import TruthBlock
 
 FS = 20000.0
 LATITUDE, AZIMUTH = np.deg2rad(48.0), np.deg2rad(30.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -11,8 +11,11 @@ from testbed.models.motion import MotionProfile
 from testbed.models.motions.sine import Sine
 from testbed.models.turntable.earth import EarthRate
 from testbed.models.turntable.parameters import Mounting, TurntableParameters
-from testbed.models.turntable.turntable import TruthBlock, Turntable
+from testbed.models.turntable.turntable import Turntable
 from testbed.signals import random_stream
+
+if TYPE_CHECKING:
+    from testbed.models.turntable.truth import TruthBlock
 
 FS = 20_000.0
 FREQ, AMPLITUDE = 5.0, 2.0

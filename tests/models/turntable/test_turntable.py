@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -16,8 +17,11 @@ from testbed.models.turntable import plant, servo
 from testbed.models.turntable.earth import EarthRate
 from testbed.models.turntable.parameters import Digital, Mounting, TurntableParameters, Wobble
 from testbed.models.turntable.servo import required_torque
-from testbed.models.turntable.turntable import TruthBlock, Turntable
+from testbed.models.turntable.turntable import Turntable
 from testbed.parts import preset
+
+if TYPE_CHECKING:
+    from testbed.models.turntable.truth import TruthBlock
 
 FS = 20000.0
 DT = 1.0 / FS
