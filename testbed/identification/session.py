@@ -159,7 +159,11 @@ def _identified(
         raise refusal_of(
             channel, channel, f"expected a response at two frequencies or more, got {measured.response.freq_hz.size}"
         )
-    model = fit_model(measured.response)
+    try:
+        model = fit_model(measured.response)
+    except ValueError as error:  # of the search, where a response or its delay is no number that it can begin with
+        words = f"no model can be fitted to its response ({error}); a reading may be damaged, or the record too short"
+        raise refusal_of(channel, channel, words) from error
     sees_constant = bool(model.numerator[-1] != 0.0)
     noise = fit_noise(floor, np.abs(model.response(floor.freq_hz)), slow_before=sees_constant)
     try:

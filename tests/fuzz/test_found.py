@@ -60,3 +60,14 @@ def test_an_option_is_not_echoed_whole(tmp_path, monkeypatch, words):
     with pytest.raises(ScenarioError) as refused:
         app(list(words), standalone_mode=False)
     assert len(str(refused.value)) < 4 * MOST_QUOTED
+
+
+def test_a_response_that_no_model_can_be_fitted_to_is_refused_and_named(tmp_path):
+    """One reading at the end of the numbers, whose response is infinite; and a record that ends early."""
+    head, *rows = RESPONSE.splitlines()
+    damaged = [*rows[:24], rows[24].rpartition(",")[0] + ",1.7e308", *rows[25:]]
+    for lines in (damaged, damaged[:162]):
+        (tmp_path / "log.csv").write_text("\n".join([head, *lines]) + "\n")
+        # Outside of the tests NumPy goes on where a number overflows.
+        with np.errstate(all="ignore"), pytest.raises(ScenarioError, match="gyro"):
+            identify_sensors(read_log(tmp_path / "log.csv"), "laser", "gyro")
