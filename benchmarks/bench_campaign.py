@@ -84,7 +84,7 @@ def main() -> None:
         Promise("1000 seeds x 3 filters x 20 s, modal plant, extrapolated [CPU s]", 60.0, float(thousand)),
         Promise(
             "lane-step with a shared covariance, 5 states [ns]",
-            10.0,
+            3.0,
             lane_ns("kalman", default_belief(), coloured=False),
         ),
         Promise("lane-step with a shared covariance, coloured noise [ns]", 18.0, lane_ns("kalman", coloured)),
@@ -93,7 +93,7 @@ def main() -> None:
             22.0,
             lane_ns("steady_state", coloured, frequency=10.0),
         ),
-        Promise("lane-step with its own covariance, shakf, 5 states [ns]", 20.0, lane_ns("shakf", default_belief())),
+        Promise("lane-step with its own covariance, shakf, 5 states [ns]", 8.0, lane_ns("shakf", default_belief())),
     )
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from testbed.errors import ScenarioError
+from testbed.models.motions import MOTIONS
+from testbed.models.motions.recorded import Recorded
 from testbed.models.turntable.servo import required_torque
 from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from testbed.models.motion import Motion
+    from testbed.models.turntable.parameters import TurntableParameters
     from testbed.scenario.model import Scenario
 
 # Terms that are worked out, each a sine over a base step or as dear as one: about a second.
@@ -48,6 +53,8 @@ class Peaks:
 def command_peaks(scenario: Scenario) -> Peaks:
     """Play the commanded motion without a plant, whole or in windows, and return its peaks.
 
+    A scenario that asks the same is not played again, unless what it plays may have changed: a file, or a plug-in.
+
     Parameters
     ----------
     scenario : Scenario
@@ -60,6 +67,34 @@ def command_peaks(scenario: Scenario) -> Peaks:
     RunError
         If the motion of a plug-in fails.
     """
+    asked = _Asked(
+        (scenario.base_rate_hz, scenario.frame.duration, scenario.frame.ramp_in),
+        scenario.truth_seed if any(motion.draws for _, motion in scenario.motion) else None,
+        scenario.motion,
+        scenario.turntable,
+        scenario,
+    )
+    lasting = all(kind in MOTIONS and not isinstance(motion, Recorded) for kind, motion in scenario.motion)
+    return _kept(asked) if lasting else _peaks(scenario)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """All that the peaks of a scenario depend on, and the scenario."""
+
+    times: tuple[float, ...]
+    truth_seed: int | None
+    motion: tuple[tuple[str, Motion], ...]
+    turntable: TurntableParameters
+    scenario: Scenario = field(compare=False, repr=False)
+
+
+@lru_cache(maxsize=64)
+def _kept(asked: _Asked) -> Peaks:
+    return _peaks(asked.scenario)
+
+
+def _peaks(scenario: Scenario) -> Peaks:
     motion, peaks, places = scenario.profile(), [0.0, -1.0, -1.0], [0, 0, 0]
     stroke, end, angle, extremes = 0.0, 0, 0.0, (0.0, 0.0)
     for start, n_time in windows(scenario.n_time, _cost(scenario)):
