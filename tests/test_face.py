@@ -26,6 +26,7 @@ EXAMPLES = [
     "testbed",
     "testbed.allan.curve",
     "testbed.allan.fit",
+    "testbed.allan.octaves",
     "testbed.campaigns.evaluate",
     "testbed.campaigns.sweep",
     "testbed.chain.runner",

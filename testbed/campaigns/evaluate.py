@@ -8,13 +8,13 @@ from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.pipeline import block_lengths, simulate
 from testbed.chain.versions import versions
 from testbed.judging.judge import Judge
+from testbed.runs.metrics import RunMetrics
 from testbed.scenario.loader import as_scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from testbed.runs.metrics import RunMetrics
     from testbed.scenario.model import Scenario
 
 # Seeds that advance together: a truth is played once for all of them, and their states take up to a MB each.
@@ -26,8 +26,7 @@ def evaluate(
     seeds: Iterable[int],
     settings: Iterable[Mapping[str, Any]] | None = None,
 ) -> list[Any]:
-    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9,
-    but for the profiles of a fluid, which a run keeps for its report.
+    """Return the metrics of a scenario under many seeds, each those of `testbed.run` with that seed to 1e-9.
 
     Only `profiles`, the fluid over the height of a channel that a report draws, belong to a run alone.
     Nothing is written and no signal is kept: memory grows neither with the duration nor with the number of seeds, but
@@ -94,7 +93,8 @@ def _alone(scenario: Scenario) -> RunMetrics:
     judge = Judge(scenario, chain.rates, chain.step)
     for block in blocks:
         judge.write(block)
-    return judge.metrics(versions())
+    whole = judge.metrics(versions()).to_dict()
+    return RunMetrics.model_validate({key: value for key, value in whole.items() if key != "profiles"})
 
 
 def _parts(seeds: Sequence[int], most: int) -> Iterator[list[int]]:

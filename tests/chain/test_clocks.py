@@ -97,7 +97,7 @@ def test_bounds_of_nearly_whole_clocks_are_those_of_the_whole() -> None:
     [
         ({"sensors.mhd_ars.clock": {"error": "1 ppm"}}, "expected the fastest sensor"),
         ({"sensors.mhd_ars.sample_rate": "3 kHz"}, "expected the fastest sensor"),
-        ({"fusion.own": {"type": "complementary"}}, "Complementary takes readings at regular steps only"),
+        ({"fusion.own": {"type": "self_calibrating"}}, "SelfCalibrating takes readings at regular steps only"),
         ({"fusion_from": "0.1 s"}, "fusion_from: expected sensors on the clock of the run"),
         ({"pointing": {}}, "pointing: expected sensors on the clock of the run"),
         ({"sensors.fog": {"preset": "fog_paper3", "clock": {}}}, "fog reads at samples of the run only"),

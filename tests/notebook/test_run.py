@@ -61,7 +61,17 @@ def test_a_name_in_the_table_is_text_and_no_markup(pair):
 
 def test_the_figures_are_those_of_the_report(run):
     figures = run.plot()
-    assert list(figures) == ["rates", "errors", "spectrum", "bode", "whiteness", "adapted", "budget"]
+    assert list(figures) == [
+        "rates",
+        "errors",
+        "spectrum",
+        "allan",
+        "bode",
+        "whiteness",
+        "adapted",
+        "profile",
+        "budget",
+    ]
     assert all(isinstance(figure, Figure) and figure.axes for figure in figures.values())
     assert [axes.get_title(loc="left")[:6] for axes in figures["errors"].axes] == ["kalman", "arw_sh"]
 
@@ -69,7 +79,7 @@ def test_the_figures_are_those_of_the_report(run):
 def test_a_notebook_shows_the_figures_and_two_cells_do_not_mix(pair):
     figures, others = pair[0].plot(), pair[1].plot()
     page, other = figures._repr_html_(), others._repr_html_()
-    assert page.count("<svg") == len(figures) == 7
+    assert page.count("<svg") == len(figures) == 9
     ids, more = (set(re.findall(r'\bid="([^"]+)"', text)) for text in (page, other))
     assert ids
     assert not ids & more
@@ -130,7 +140,11 @@ def test_without_the_extra_the_error_says_how_to_install_it(pair, monkeypatch, m
 def test_the_line_that_installs_names_this_distribution_and_its_extra():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     assert f"pip install '{project['name']}[notebook]'" == INSTALL
-    assert {line.split(">")[0] for line in project["optional-dependencies"]["notebook"]} == {"pandas", "xarray"}
+    assert {line.split(">")[0] for line in project["optional-dependencies"]["notebook"]} == {
+        "duckdb",
+        "pandas",
+        "xarray",
+    }
 
 
 @pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda run: pickle.loads(pickle.dumps(run))])

@@ -90,8 +90,10 @@ def test_stamps_survive_every_format(name, tmp_path, rng):
 
 def test_a_filter_of_regular_steps_refuses_by_its_name(tmp_path, rng):
     said, _, _ = record(tmp_path, CLOCKS["6664 Hz"], rng)
-    with pytest.raises(ScenarioError, match=r"complementary: .*expected 20000 Hz to be an integer multiple") as error:
-        testbed.replay([], ["kalman", "complementary"], map=said)
+    with pytest.raises(
+        ScenarioError, match=r"self_calibrating: .*expected 20000 Hz to be an integer multiple"
+    ) as error:
+        testbed.replay([], ["kalman", "self_calibrating"], map=said)
     assert len(error.value.problems) == 1
 
 

@@ -39,7 +39,7 @@ def address():
 
 @pytest.mark.slow
 def test_a_broken_link_and_a_missing_anchor_end_it_with_an_error_and_are_named(address, tmp_path):
-    pytest.importorskip("sphinx", reason="the extra docs is not installed")
+    pytest.importorskip("myst_parser", reason="the extra docs is not installed")
     settings = [
         line for line in (ROOT / "docs/conf.py").read_text("utf-8").splitlines() if line.startswith("linkcheck")
     ]

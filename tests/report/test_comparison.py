@@ -18,7 +18,7 @@ from tests.report.test_within import RUN
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
     place = tmp_path_factory.mktemp("two")
-    second = {**RUN, "seed": 6, "fusion": {"kalman": {}, "wideband": {}}}
+    second = {**RUN, "seed": 6, "fusion": {"kalman": {}, "steady_state": {}}}
     for name, scenario in (("one", RUN), ("other", second)):
         testbed.run(scenario, out=place / name, outputs=("netcdf",))
     return place
@@ -46,8 +46,8 @@ def test_the_ratio_is_that_of_the_metrics_and_strangers_are_named(folders, page)
     for name in ("mhd_ars", "mems_gyro", "kalman"):
         row = re.search(rf'<tr data-name="{name}">.*?data-metric="ratio"><data value="([^"]+)"', text)
         assert float(row[1]) == pytest.approx(other.sources[name].rmse_deg_s / one.sources[name].rmse_deg_s, rel=1e-12)
-    assert "Only in A: shakf." in text
-    assert "Only in B: wideband." in text
+    assert "Only in A: shakf, wideband." in text
+    assert "Only in B: steady_state." in text
     assert '<th scope="row">seed</th><td class="text">5</td><td class="text">6</td>' in text
 
 

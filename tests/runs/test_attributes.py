@@ -14,7 +14,7 @@ from testbed.fusion import FILTERS
 from tests.scenes import short
 
 # All of what is written, as UDUNITS has it; cf_units.Unit, once asked, knows each.
-UNITS = {"s", "rad", "rad/s", "rad^2/s^2", "K", "1"}
+UNITS = {"s", "rad", "rad/s", "rad^2/s^2", "K", "Hz", "1"}
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 

@@ -29,6 +29,8 @@ FREQUENCY = "frequency_"
 # A lag is long enough once the signal turns by this angle in it [rad]; the next shorter one then sees at least a
 # quarter of a turn less.
 _TURN = np.pi / 8.0
+# No sensor turns as fast: such a reading is none [rad/s].
+_LARGEST = 1e6
 _GRID_HZ = np.geomspace(1e-3, 1e3, 1201)
 # The believed noise is integrated over these frequencies.
 _NOISE_HZ = np.concatenate([[0.0], np.geomspace(1e-4, 1e4, 4001)])
@@ -153,7 +155,7 @@ class _Energies:
         """Return the corrected energies of signal and increments, shape (n_lag, n_time) [rad^2/s^2]; NaN before the
         first.
         """
-        z = np.concatenate([self._past, z])
+        z = np.concatenate([self._past, np.where(np.abs(z) < _LARGEST, z, np.nan)])
         n = z.size - self._past.size
         means = np.empty((2, len(self.lags), n))
         for i, (lag, noise) in enumerate(zip(self.lags, self._noise, strict=True)):
