@@ -124,12 +124,13 @@ class Stamps:
         bounds = np.concatenate([[0], np.cumsum([one.size for one in stamps])]).astype(np.int64)
         given = (np.concatenate(stamps), np.concatenate(values), bounds, self._period, self._fastest, self._memory)
         room = _room(len(values), 2 * int(bounds[-1]))
-        before, late = self._memory[3][self._fastest], self._memory[3]
+        before = self._memory[3].copy()
         n_step = merge_stamps(*given, room)
         Z, length, shown = (one[..., :n_step] for one in room)
+        late = self._memory[3].copy()
         # Those that came too late are the first ones.
-        time_ns = stamps[self._fastest][late[self._fastest] - before :]
-        return Z, Timing(length, shown, late.copy(), time_ns.copy())
+        in_time = stamps[self._fastest][(late - before)[self._fastest] :]
+        return Z, Timing(length, shown, late, in_time.copy())
 
     def _known(self, given: Mapping[str, ArrayLike], what: str = "readings") -> tuple[str, ...]:
         if set(given) != set(self.sensors):
