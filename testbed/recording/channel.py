@@ -89,11 +89,11 @@ class Channel:
         frame = [[[-right, 0], [right, 0]], [[-right, up], [right, up]], [[0, 0], [0, up]], [[-right, 0], [-right, up]]]
         walls = rr.LineStrips2D(frame, colors=rgb(INK), radii=[rr.Radius.ui_points(r) for r in (2.0, 2.0, 0.5, 0.5)])
         self._recording.static(f"{self.entity}/axes", walls)
-        texts = [(x * right, 7.0, f"{x * full:g}") for x in (-1.0, -0.5, 0.0, 0.5, 1.0)]
-        texts += [(-right - 9.0, y * up, f"{y * top * 1e3:g}") for y in (0.0, 0.5, 1.0)]
+        texts = [(x * right, 9.0, f"{x * full:g}") for x in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+        texts += [(-right - 13.0, y * up, f"{y * top * 1e3:g}") for y in (0.0, 0.5, 1.0)]
         texts += [
-            (0.0, 17.0, f"fluid minus wall, per radius [{self._unit}]"),
-            (-right + 12.0, up - 10.0, "height above lower wall [mm]"),
+            (0.0, 27.0, f"fluid minus wall, per radius [{self._unit}]"),
+            (-right + 12.0, up - 16.0, "height above lower wall [mm]"),
         ]
         places = rr.Points2D(
             [text[:2] for text in texts],

@@ -26,25 +26,27 @@ ZOOM = 0.05  # s on each side of the time cursor
 SHOWN = 0.5  # s of the window recorded sample by sample
 FEWEST = 1000  # samples in both, at the least
 LEGEND = 0.25  # room for the legend, as a share of the span
+MARGIN = 0.05  # room on the right, as a share of the span, in which the last time on the axis stands whole
 LOG = "log10_"
 # Points of the screen: what plots share in a window of 900, what a plot needs beside its legend, and a name in that.
 ROOM, FRAME, ENTRY = 834, 88, 23
-DIAGNOSTICS = {  # prefix of the name: quantity and unit, in which {} is that of a rate
-    # The viewer has no logarithmic axis: what spans decades is recorded as its logarithm too.
-    f"{LOG}R_": ("Adapted R", "log10 of ({})²"),
-    f"{LOG}N_": ("Noise statistic N", "log10 of ({})²"),
-    f"{LOG}Q_": ("Process noise Q", "log10 of ({})²"),
-    "gated_": ("Gated readings", "counted"),
-    "R_": ("Adapted R", "({})²"),
-    "N_": ("Noise statistic N", "({})²"),
-    "frequency_": ("Frequency that is seen", "Hz"),
-    "band_": ("Band: 0 low, 1 mid, 2 high", "-"),
-    "innovation_": ("Innovation", "{}"),
-    "innovation_variance_": ("Innovation variance", "({})²"),
-    "S_": ("Factor S of R", "-"),
-    "Q_": ("Process noise Q", "({})²"),
-    "std": ("Claimed std", "{}"),
-    "": ("Diagnostic", ""),
+DIAGNOSTICS = {  # prefix of the name: name of the tab, short, since all share a row; quantity and unit of the plot
+    # The viewer has no logarithmic axis: what spans decades is recorded as its logarithm too. {} is the unit of a rate.
+    f"{LOG}R_": ("R", "Adapted R", "log10 of ({})²"),
+    f"{LOG}N_": ("N", "Noise statistic N", "log10 of ({})²"),
+    f"{LOG}Q_": ("Q", "Process noise Q", "log10 of ({})²"),
+    "gated_": ("Gated", "Gated readings", "counted"),
+    "R_": ("R", "Adapted R", "({})²"),
+    "N_": ("N", "Noise statistic N", "({})²"),
+    "frequency_": ("Frequency", "Frequency that is seen", "Hz"),
+    "band_": ("Band", "Band: 0 low, 1 mid, 2 high", "-"),
+    "innovation_": ("Innovation", "Innovation", "{}"),
+    f"{LOG}innovation_variance_": ("Its variance", "Innovation variance", "log10 of ({})²"),
+    "innovation_variance_": ("Its variance", "Innovation variance", "({})²"),
+    "S_": ("S", "Factor S of R", "-"),
+    "Q_": ("Q", "Process noise Q", "({})²"),
+    "std": ("Claimed std", "Claimed std", "{}"),
+    "": ("Other", "", ""),
 }
 
 
@@ -133,7 +135,7 @@ def blueprint(
         right.append(("Temperature", views, len(thermometers)))
     if diagnostics := _diagnostics(entities, sensors):
         views = [_beside(kind, by_sensor, duration, unit) for kind, by_sensor in diagnostics.items()]
-        # Plots beside each other have titles of their own below the tabs'.
+        # These plots have titles of their own below the tabs'.
         n_lines = 1 + max(map(len, next(iter(diagnostics.values())).values()))
         right.append(("Inside the filters", views, n_lines))
     shares = {"row_shares": [3, 2, 2][: len(left)]} if len(left) > 1 else {}
@@ -170,7 +172,7 @@ def _plot(name: str, contents: Iterable[str], span: tuple[float, float], legend:
     data = rr.TimeRange(start=_absolute(span[0]), end=_absolute(span[1]))
     # The legend stands in an empty margin, not on the curves.
     length = span[1] - span[0]
-    shown = rr.TimeRange(start=_absolute(span[0] - legend * length), end=_absolute(span[1] + 0.02 * length))
+    shown = rr.TimeRange(start=_absolute(span[0] - legend * length), end=_absolute(span[1] + MARGIN * length))
     return _series(name, contents, data, shown)
 
 
@@ -181,7 +183,7 @@ def _short(seconds: float) -> str:
 def _at_cursor(name: str, contents: Iterable[str], around: float) -> rrb.TimeSeriesView:
     at = rrb.TimeRangeBoundary.cursor_relative
     data = rr.TimeRange(start=at(seconds=-around), end=at(seconds=around))
-    shown = rr.TimeRange(start=at(seconds=-around * (1 + 2 * LEGEND)), end=at(seconds=around))
+    shown = rr.TimeRange(start=at(seconds=-around * (1 + 2 * LEGEND)), end=at(seconds=around * (1 + 2 * MARGIN)))
     return _series(name, contents, data, shown)
 
 
@@ -211,16 +213,16 @@ def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, d
     return {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
 
 
-def _beside(
-    kind: str, contents_of: Mapping[str, Sequence[str]], duration: float, unit: RateUnit
-) -> rrb.View | rrb.Container:
-    quantity, dimension = DIAGNOSTICS[kind]
+def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float, unit: RateUnit) -> rrb.Container:
+    tab, quantity, dimension = DIAGNOSTICS[kind]
     suffix = f" [{dimension.format(unit)}]" if dimension else ""
+    # What has no name of a kind is many quantities, each a tab; sensors stand beside each other.
+    n_beside = len(contents_of) if kind else 1
     plots = [
-        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration), LEGEND * len(contents_of))
+        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration), LEGEND * n_beside)
         for of, contents in contents_of.items()
     ]
-    return plots[0] if len(plots) == 1 else rrb.Horizontal(*plots, name=quantity + suffix)
+    return rrb.Horizontal(*plots, name=tab) if kind else rrb.Tabs(*plots, active_tab=0, name=tab)
 
 
 def _turntable(model: mujoco.MjModel) -> rrb.Spatial3DView:
@@ -237,14 +239,14 @@ def _turntable(model: mujoco.MjModel) -> rrb.Spatial3DView:
 
 
 def _target() -> rrb.Spatial2DView:
-    bounds = rrb.VisualBounds2D(x_range=[-1.3 * HALF, 1.3 * HALF], y_range=[-1.1 * HALF, 1.35 * HALF])
+    bounds = rrb.VisualBounds2D(x_range=[-1.3 * HALF, 1.3 * HALF], y_range=[-1.1 * HALF, 1.72 * HALF])
     return rrb.Spatial2DView(origin=TARGET, contents=["$origin/**"], name="Beam on the target", visual_bounds=bounds)
 
 
 def _profile(sensor: str) -> rrb.Spatial2DView:
     margin = 26.0
     bounds = rrb.VisualBounds2D(
-        x_range=[-WIDTH / 2 - margin, WIDTH / 2 + margin], y_range=[-HEIGHT - 0.6 * margin, margin]
+        x_range=[-WIDTH / 2 - margin, WIDTH / 2 + margin], y_range=[-HEIGHT - margin, 1.7 * margin]
     )
     return rrb.Spatial2DView(
         origin=f"/sensors/{sensor}/channel",

@@ -79,12 +79,12 @@ class Target:
             style = rr.Points2D.from_fields(colors=[rgb(color)], radii=[rr.Radius.ui_points(7.0)], draw_order=20.0)
             self._recording.static(f"{ENTITY}/{name}", to_row, style)
             strips.append(np.array([[-HALF, height], [HALF, height]]))
-            labels.append((-HALF, height - 5.0, name))
+            labels.append((-1.25 * HALF, height, name))
         strips += [share * HALF * circle for share in (0.5, 1.0)] + [np.array([[0.0, -HALF], [0.0, HALF]])]
         axes = rr.LineStrips2D(strips, colors=rgb(INK), radii=rr.Radius.ui_points(0.5))
         self._recording.static(f"{ENTITY}/axes", axes)
-        labels += [(share * HALF, HALF + 9.0, f"{share * full:g}") for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
-        labels.append((0.0, HALF + 19.0, "pointing error [µrad]"))
+        labels += [(share * HALF, HALF + 14.0, f"{share * full:g}") for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+        labels.append((0.0, HALF + 39.0, "pointing error [µrad]"))
         texts = rr.Points2D(
             [place[:2] for place in labels],
             labels=[place[2] for place in labels],

@@ -177,7 +177,7 @@ class RecordingWriter:
 
     def _write_diagnostic(self, key: str, series: str, values: FloatArray) -> None:
         shown = {series: values}
-        if series.startswith(("R_", "Q_", "N_")):
+        if series.startswith(("R_", "Q_", "N_", "innovation_variance_")):
             shown[LOG + series] = _log10(values)
         for each, row in shown.items():
             name = key.removeprefix("fusion/")

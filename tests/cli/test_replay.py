@@ -37,9 +37,10 @@ def finding(kind="sign", value=-1.0, unit="1"):
 
 def test_a_bench_file_is_replayed(spoken, stands, tmp_path):
     stands()
-    status, out, err = spoken("replay", "bench.csv", "--filter", "kalman, blending")
+    status, out, err = spoken("replay", "bench.csv", "--filter", "kalman, blending", "--filter", "wideband")
     assert status == 0, err
-    for text in ("bench, replayed: mean and spread", "nothing stands against", "wrote runs/replay_bench", "blending"):
+    filters = ("kalman", "blending", "wideband")
+    for text in ("bench, replayed: mean and spread", "nothing stands against", "wrote runs/replay_bench", *filters):
         assert text in out
     assert "bench: text" in err
     assert "without a reference" in err
@@ -107,6 +108,7 @@ def test_what_is_not_safe_stands_though_it_was_asked_to_be_put_right(spoken, sta
     [
         (("bench.csv",), "--filter: expected at least one filter"),
         (("bench.csv", "--filter", "kalman,"), "expected names with commas between them"),
+        (("bench.csv", "--filter", "calman", "--filter", "kalman"), "unknown filter 'calman'"),
         (("bench.csv", "--filter", "calman"), "unknown filter 'calman'"),
         (("--filter", "kalman"), "LOG: expected a recording"),
         (("none.csv", "--filter", "kalman"), "none.csv: expected a recording"),

@@ -22,10 +22,8 @@ def first(mapping, count=1):
 # What makes a program small: new values of its globals by what it has; its arguments; a word of what it then prints.
 SMALL = {
     "baselines": (
-        lambda its: (
-            {"SIGNALS": first(its.SIGNALS), "COMPARED": ("kalman", "complementary"), "DURATION": 2.0} | {"SETTLE": 1.0}
-        ),
-        ["1"],
+        lambda _its: {"SHORT": (1, 2.0, ("0.5 Hz",)), "COMPARED": ("kalman", "complementary")},
+        [],
         "x optimum",
     ),
     "frequency_indicator": (
@@ -38,10 +36,9 @@ SMALL = {
             "MODELS": {"gradient": ("gradient", None, ("paper, 1",))},
             "TRUTHS": first(its.TRUTHS),
             "UNSEEN": its.UNSEEN[2:4],
-            "PERIODS": its.PERIODS[:1],
-            "searches": lambda _seed: None,  # three searches of a minute; tests/compensation has them
+            "PERIODS": its.PERIODS[:1],  # without --full no searches; tests/compensation has them
         },
-        ["1"],
+        [],
         "gain of an injected rate",
     ),
     "replay_with_faults": (lambda _its: {}, [], "sign -1 put right"),

@@ -98,3 +98,9 @@ def titles(part):
     for inner in getattr(part, "contents", []):
         if not isinstance(inner, str):
             yield from titles(inner)
+
+
+def test_the_names_of_all_diagnostics_stand_in_one_row_of_tabs():
+    """Three fifths of a window of 1600 points; a letter takes at most 8 of them, icon and space 36."""
+    names = {tab for tab, _, _ in DIAGNOSTICS.values()}
+    assert sum(8 * len(name) + 36 for name in names) <= 0.6 * 1600

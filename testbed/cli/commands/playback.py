@@ -40,9 +40,12 @@ def replay(
         typer.Option("--map", metavar="LOG.yaml", help="Which channel is what; default what the file's words say."),
     ] = None,
     filter_: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            "--filter", metavar="LIST", help="Filters by name, such as kalman,wideband.", autocompletion=_filters
+            "--filter",
+            metavar="LIST",
+            help="Filters by name, such as kalman,wideband. May be repeated.",
+            autocompletion=_filters,
         ),
     ] = None,
     fusion: Annotated[
@@ -87,7 +90,7 @@ def replay(
     length = None if settle is None else 0.0 if settle.strip() == "0" else quantity(settle, "s", "2 s", "--settle")
     made = prepare(
         log or [],
-        _list(filter_),
+        [name for names in filter_ or () for name in _list(names)],
         fusion=fusion,
         map=map_,
         belief=belief,
