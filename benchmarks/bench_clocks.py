@@ -2,7 +2,6 @@
 the nearest whole ratio; every filter that takes them, whole calls of `process`, interleaved in one process.
 
 Promised: at most 1.3 times the integer path at 20000/2003.704 Hz, 1.7 at 20000/6664 and 2 with a jittering fast clock.
-A step of the filters of two paths costs a quarter of one of `kalman`, merging as much: 1.7 for the first too.
 Run:
 python benchmarks/bench_clocks.py
 """
@@ -16,14 +15,12 @@ from promises import Promise, conclude
 from testbed.fusion import FILTERS
 from testbed.fusion.base import BlockFilter
 from testbed.fusion.belief import default_belief
-from testbed.fusion.two_paths.base import TwoPaths
 from testbed.parts import resolve
 from testbed.signals import FloatArray, random_stream
 
 FAST = 20_000.0
 # Rate of the slow sensor, jitter of the fast clock in its periods, the nearest whole ratio, most times its cost.
 CASES = [(2003.704, 0.0, 10, 1.3), (6664.0, 0.0, 3, 1.7), (2000.0, 0.2, 10, 2.0)]
-LIGHT = 1.7
 
 
 def record(slow_hz: float, jitter: float, n: int) -> tuple[dict[str, FloatArray], dict[str, np.ndarray]]:
@@ -75,7 +72,6 @@ def main() -> None:
             continue
         for case in CASES:
             slow_hz, jitter, stride, most = case
-            most = max(most, LIGHT) if issubclass(kind, TwoPaths) else most
             ratio(kind, case, 600, 1)
             found = ratio(kind, case, n, given.repeats)
             what = f"{name}, {FAST:g}/{slow_hz:g} Hz{', fast clock jitters' if jitter else ''}"

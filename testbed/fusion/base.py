@@ -18,12 +18,12 @@ from testbed.fusion.kernels.merging import show_steps
 from testbed.fusion.schedule import Schedule, odd_sensor
 from testbed.fusion.stamps import Stamps, Timing
 from testbed.fusion.start import StartKind
-from testbed.fusion.transitions import EVEN, Steps
+from testbed.fusion.transitions import EVEN, Steps, steps_of
 from testbed.parts import Part
 from testbed.units import Rate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -305,11 +305,10 @@ class BlockFilter:
             shown = timing.shown[part]
             out = room[: self._pending.size * shown.size].reshape(self._pending.size, shown.size)
             out.fill(np.nan)
-            node, share, whole = timing.steps
-            self._advance(_read_only(Z[:, part]), out, Steps(node[part], share[part], whole[part]))
+            self._advance(_read_only(Z[:, part]), out, steps_of(timing.length[part]))
             show_steps(out, shown, HEADER_ROWS, self._pending, kept, begin)
             begin += int(np.count_nonzero(shown))
-        return self._timed(self._shown(kept, gated[:, timing.shown]), timing.late, timing.time_ns)
+        return self._timed(self._shown(kept, [row[timing.shown] for row in gated]), timing.late, timing.time_ns)
 
     def _timed(self, block: EstimateBlock, late: NDArray[np.int64], time_ns: NDArray[np.int64]) -> EstimateBlock:
         counts = zip(self.schedule.sensors, late, strict=True)
@@ -340,7 +339,7 @@ class BlockFilter:
     def _rows_of(self, n_time: int) -> FloatArray:
         return np.full((HEADER_ROWS + len(self.rows.names(self.schedule.sensors)), n_time), np.nan)
 
-    def _shown(self, out: FloatArray, gated: FloatArray) -> EstimateBlock:
+    def _shown(self, out: FloatArray, gated: Iterable[FloatArray]) -> EstimateBlock:
         sensors = self.schedule.sensors
         rows = zip(self.rows.names(sensors), out[HEADER_ROWS:], strict=True)
         shown = {name: row for name, row in rows if name is not None}

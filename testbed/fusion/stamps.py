@@ -8,7 +8,6 @@ import numpy as np
 
 from testbed.fusion.kernels.merging import merge_stamps
 from testbed.fusion.schedule import nearest_clock, odd_sensor
-from testbed.fusion.transitions import Steps
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +27,8 @@ class Timing(NamedTuple):
 
     Parameters
     ----------
-    steps : Steps
-        How each step is reached.
+    length : ndarray, shape (n_step,)
+        How long each step is, in regular ones (`testbed.fusion.transitions.steps_of`).
     shown : ndarray of bool, shape (n_step,)
         Where the fastest sensor has a reading: there the estimate is shown.
     late : ndarray of int, shape (n_sensor,)
@@ -38,7 +37,7 @@ class Timing(NamedTuple):
         Stamps of what is shown [ns].
     """
 
-    steps: Steps
+    length: FloatArray
     shown: NDArray[np.bool_]
     late: NDArray[np.int64]
     time_ns: NDArray[np.int64]
@@ -125,10 +124,13 @@ class Stamps:
         bounds = np.concatenate([[0], np.cumsum([one.size for one in stamps])]).astype(np.int64)
         given = (np.concatenate(stamps), np.concatenate(values), bounds, self._period, self._fastest, self._memory)
         room = _room(len(values), 2 * int(bounds[-1]))
+        before = self._memory[3].copy()
         n_step = merge_stamps(*given, room)
-        Z, node, share, whole, shown, stamp = (one[..., :n_step] for one in room)
-        steps = Steps(node, share, whole)
-        return np.ascontiguousarray(Z), Timing(steps, shown, self._memory[3].copy(), stamp[shown])
+        Z, length, shown = (one[..., :n_step] for one in room)
+        late = self._memory[3].copy()
+        # Those that came too late are the first ones.
+        in_time = stamps[self._fastest][(late - before)[self._fastest] :]
+        return Z, Timing(length, shown, late, in_time.copy())
 
     def _known(self, given: Mapping[str, ArrayLike], what: str = "readings") -> tuple[str, ...]:
         if set(given) != set(self.sensors):
@@ -155,8 +157,7 @@ def _whole(name: str, stamps: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.i
 
 # Not touched, memory that was asked for costs nothing.
 def _room(n_sensor: int, n_step: int) -> tuple[np.ndarray, ...]:
-    of_all = (np.empty(n_step, np.int64), np.empty(n_step), np.empty(n_step, np.int64), np.empty(n_step, np.bool_))
-    return (np.empty((n_sensor, n_step)), *of_all, np.empty(n_step, np.int64))
+    return np.empty((n_sensor, n_step)), np.empty(n_step), np.empty(n_step, np.bool_)
 
 
 def rates_of(time_ns: Mapping[str, ArrayLike]) -> dict[str, float]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from testbed.fusion.kernels.covariance import NODES
+from testbed.fusion.kernels.merging import LONGEST, place_steps
 from testbed.signals import van_loan
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
     from testbed.signals import FloatArray
 
-# The longest step that is taken at once, in regular ones; what is longer begins with whole regular steps.
-LONGEST = 1.5
 N_NODE = round(LONGEST * NODES) + 1
 
 
@@ -44,6 +43,20 @@ class Steps(NamedTuple):
 
 EVEN = Steps(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))
 """Every step is a regular one."""
+
+
+def steps_of(length: FloatArray) -> Steps:
+    """Return how steps of these lengths are reached.
+
+    Parameters
+    ----------
+    length : ndarray, shape (n_step,)
+        In regular steps.
+    """
+    n = length.size
+    steps = Steps(np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64))
+    place_steps(length, *steps)
+    return steps
 
 
 def even(*matrices: NDArray[Any]) -> tuple[np.ndarray, ...]:

@@ -16,7 +16,7 @@ from testbed.fusion.belief import default_belief
 from testbed.fusion.kernels.covariance import NODES
 from testbed.fusion.model import FusionModel, build_model
 from testbed.fusion.stamps import Stamps, rates_of, regular
-from testbed.fusion.transitions import N_NODE, transition_nodes
+from testbed.fusion.transitions import N_NODE, steps_of, transition_nodes
 from testbed.parts import resolve
 from testbed.signals import FloatArray, random_stream
 
@@ -236,7 +236,8 @@ def test_rates_in_any_ratio_are_the_stamps_that_they_imply(name: str) -> None:
 def test_a_method_of_regular_steps_refuses_other_clocks_by_name(name: str) -> None:
     kind = resolve("filter", name, FILTERS).__name__
     readings, stamps = record(20e3, 2e3, 200)
-    with pytest.raises(ValueError, match=f"{kind} takes readings at regular steps only"):
+    refusal = f"time_ns: {kind} takes readings at regular steps only, no stamps; resample them, or take `kalman`"
+    with pytest.raises(ValueError, match=f"^{refusal}$"):
         estimate(name, readings, time_ns=stamps)
     with pytest.raises(ValueError, match=f"integer multiple of 'mems_gyro' for {kind}, got 2003.7 Hz; `kalman`"):
         built(name, {"mhd_ars": 20e3, "mems_gyro": 2003.7})
@@ -314,6 +315,7 @@ def test_a_step_without_a_reading_is_marked_where_a_sensor_is_silent() -> None:
     Z, timing = Stamps({"a": 1e8, "b": 5e7}).spread({"a": np.ones(6), "b": np.ones(2)}, stamps)
     assert np.isinf(Z[0]).tolist() == [False] * 5 + [True, False]
     assert np.isinf(Z[1]).tolist() == [False] * 5 + [True, False]
-    assert timing.steps.whole.tolist() == [0] * 6 + [4]
-    assert timing.steps.node.tolist() == [NODES] * 7
+    steps = steps_of(timing.length)
+    assert steps.whole.tolist() == [0] * 6 + [4]
+    assert steps.node.tolist() == [NODES] * 7
     assert timing.shown.tolist() == [True] * 5 + [False, True]

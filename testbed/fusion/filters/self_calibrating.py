@@ -114,6 +114,10 @@ class SelfCalibrating(BlockFilter):
     gain, of the one that is blind to a constant rate; the delay is a pole behind the dynamics of whichever sensor is
     late. After a change the filter goes once more through the last ten seconds. What both sensors share cannot be seen.
 
+    Stamps, and rates without a whole ratio, are refused: the spectra that are compared need both sensors at the same
+    instants, and two clocks share none. Interpolated to them a sensor loses gain by where they fall between its
+    readings, and clocks that drift apart, where the stamps do not tell, are a delay that grows, not one that lasts.
+
     Parameters
     ----------
     belief : mapping of str to SensorBelief

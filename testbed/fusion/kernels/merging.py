@@ -18,12 +18,14 @@ from testbed.fusion.schedule import LARGEST_RATE
 NOTHING, HEARD, OVERDUE = range(3)
 # So many of its periods after the last reading one is missing.
 PATIENCE = 1.5
+# The longest step that is taken at once, in regular ones; what is longer begins with whole regular steps.
+LONGEST = 1.5
 # Steps this close to a node are taken for it, in nodes.
 NEAR = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PLR0912  # pragma: no cover
+def merge_stamps(time, value, bounds, period, fastest, memory, out):  # pragma: no cover
     """Fill `out` with the steps of a block, advance `memory`, and return how many there are.
 
     Parameters
@@ -40,11 +42,12 @@ def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PL
         (begun, last step [ns]), shape (2,); of each sensor the last stamp, what is known, and readings that came too
         late, each of shape (n_sensor,).
     out : tuple
-        (Z, node, share, whole, shown, stamp), with room for two steps per reading.
+        (Z, length, shown), with room for two steps per reading: Z (n_sensor, n_step) the readings, NaN where none is,
+        infinite where one is missing; the length of each step in regular ones; whether the fastest has a reading there.
     """
     begun, now, T = memory[0][0] > 0, memory[0][1], period[fastest]
     _, last, known, late = memory
-    Z, node, share, whole, shown, stamp = out
+    Z, length, shown = out
     n_sensor, head, k = period.size, bounds[:-1].copy(), 0
     for i in range(n_sensor):
         while begun and head[i] < bounds[i + 1] and time[head[i]] < now:
@@ -57,27 +60,17 @@ def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PL
                 there, t = True, time[head[i]]
         if not there:
             break
-        j, s, first = NODES, 0.0, 0.0
-        if begun:
-            length = (t - now) / T
-            first = max(np.ceil(length - PATIENCE), 0.0)
-            place = (length - first) * NODES
-            j = int(place)
-            s = place - j
-            if s < NEAR:
-                s = 0.0
-            elif s > 1.0 - NEAR:
-                j, s = j + 1, 0.0
-            if first > 0.0:
-                # The first of them has a place of its own, where the gap is seen.
-                node[k], share[k], whole[k], shown[k], stamp[k] = NODES, 0.0, 0, False, now
-                first -= 1.0
-                for i in range(n_sensor):
-                    Z[i, k] = np.nan
-                    if known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
-                        Z[i, k], known[i] = np.inf, OVERDUE
-                k += 1
-        node[k], share[k], whole[k], shown[k], stamp[k] = j, s, int(first), False, t
+        taken = (t - now) / T if begun else 1.0
+        if taken > LONGEST:
+            # The first regular step of it has a place of its own, where the gap is seen.
+            length[k], shown[k] = 1.0, False
+            taken -= 1.0
+            for i in range(n_sensor):
+                Z[i, k] = np.nan
+                if known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
+                    Z[i, k], known[i] = np.inf, OVERDUE
+            k += 1
+        length[k], shown[k] = taken, False
         for i in range(n_sensor):
             Z[i, k] = np.nan
             if head[i] < bounds[i + 1] and time[head[i]] == t:
@@ -92,6 +85,23 @@ def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PL
         k += 1
     memory[0][0], memory[0][1] = begun, now
     return k
+
+
+@njit(cache=True, error_model="numpy")
+def place_steps(length, node, share, whole):  # pragma: no cover
+    """Fill (node, share, whole) of `testbed.fusion.transitions.Steps`, each of shape (n_step,), for steps of these
+    lengths, in regular ones.
+    """
+    for k in range(length.size):
+        first = max(np.ceil(length[k] - LONGEST), 0.0)
+        place = (length[k] - first) * NODES
+        j = int(place)
+        s = place - j
+        if s < NEAR:
+            s = 0.0
+        elif s > 1.0 - NEAR:
+            j, s = j + 1, 0.0
+        node[k], share[k], whole[k] = j, s, int(first)
 
 
 @njit(cache=True, error_model="numpy")
