@@ -9,9 +9,7 @@ from testbed.units import Frequency, Range, RateDensity
 
 
 class BandPass(Sensor):
-    r"""A rate sensor that sees a band, with white noise on its readings.
-
-    :math:`G(s) = \omega_2 s / (s + \omega_1) / (s + \omega_2)`
+    r"""White noise on readings of a band, :math:`G(s) = \omega_2 s / (s + \omega_1) / (s + \omega_2)`.
 
     Parameters
     ----------

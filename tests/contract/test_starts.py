@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -18,6 +20,13 @@ PROMISING = [name for name in NAMES if METHODS[name].start_leaves is not None]
 
 def taking_start() -> list[str]:
     return [name for name in NAMES if "start" in METHODS[name].Parameters.model_fields]
+
+
+GIVEN: dict[str, Any] = {"belief": "eq39", "rest_rate": 6e-5, "verdict": False}
+
+
+def ungated(name: str) -> dict[str, str]:
+    return {"gate": "off"} if "gate" in METHODS[name].Parameters.model_fields else {}
 
 
 @pytest.mark.slow
@@ -46,8 +55,8 @@ def test_a_declared_rest_is_a_start_at_the_rate_of_rest(name: str) -> None:
     rate, readings = record(lambda t: np.full(t.size, 6e-5), 0.2, 1, {"mhd_ars": {"noise": False}})
     readings["mems_gyro"] = np.full(readings["mems_gyro"].size, 6e-5 * 15.626 / 15.444)
     told, unknown = (
-        # Without noise the readings repeat, which the verdict would name.
-        estimate(named(name), readings, sample_rate_hz=RATES, belief="eq39", start=start, rest_rate=6e-5, verdict=False)
+        # Without noise the readings repeat, which the verdict would name and the gate take for a stuck sensor.
+        estimate(named(name), readings, sample_rate_hz=RATES, start=start, **GIVEN, **ungated(name))
         for start in ("rest", "unknown")
     )
     assert np.max(np.abs(told.rate - rate)) < 1e-3 * 6e-5
