@@ -5,7 +5,8 @@
 1 % or -0.8 % of gain, 0.5 or 0.4 ms of delay of the MHD ARS, 1 deg/s at 0.5, 4 and 10 Hz and mixed, the last 10 s of
 20 s, from rest, belief equation (39): the mean error over the seeds at most 1.2 times that of the twin run without the
 error (of the filter inside alone) and 0.0004 deg/s. At rest, at 0.01 deg/s and on the jitter of a reaction wheel at
-most 5 % above the filter inside alone. Exits with 1 if a bar is missed.
+most 5 % above the filter inside alone. What a delay leaves on the wheel, where it is not mended, is printed without a
+bar. Exits with 1 if a bar is missed.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ ERRORS = {
     "0.5 ms": {"delay": 0.5e-3},
     "0.4 ms": {"delay": 0.4e-3},
 }
+# Of those, what is not mended on the wheel's jitter.
+UNMENDED = ("0.5 ms", "0.4 ms")
 FACTOR, MARGIN, COST = 1.2, 4e-4, 1.05
 
 
@@ -68,6 +71,11 @@ def error(filters, signal, seed, change):
     return [rms((estimate(name, z, **given, **own).rate - rate)[half:]) / DEG for name, own in filters]
 
 
+def left_of(calibrating, signal, seeds, name):
+    """Return the mean error over the seeds [deg/s] with the error of that name."""
+    return np.mean([error([calibrating], signal, seed, ERRORS[name]) for seed in seeds])
+
+
 def main() -> int:
     """Print one line for each bar."""
     seeds = range(1, (int(sys.argv[1]) if len(sys.argv) > 1 else 10) + 1)
@@ -80,10 +88,12 @@ def main() -> int:
         if signal == WHEEL or len(LINES[signal]) == 0 or LINES[signal][0][1] < 1.0:
             missed += right[1] > COST * right[0]
             print(f"{line}, {right[1] / right[0]:.3f} of at most {COST}", flush=True)
+            for name in UNMENDED if signal == WHEEL else ():
+                print(f"  {name}: {left_of(calibrating, signal, seeds, name):.5f}, no bar", flush=True)
             continue
         print(line, flush=True)
-        for name, change in ERRORS.items():
-            left = np.mean([error([calibrating], signal, seed, change) for seed in seeds])
+        for name in ERRORS:
+            left = left_of(calibrating, signal, seeds, name)
             bar = FACTOR * right[0] + MARGIN
             missed += left > bar
             print(f"  {name}: {left:.5f} of at most {bar:.5f}", flush=True)

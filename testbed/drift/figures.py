@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from testbed.allan.fit import term_variance
 from testbed.drift.findings import DRIFT_PERIOD, LEAST_GAIN
 from testbed.drift.quality import timed_means
-from testbed.pages.palette import FILTERS, SENSORS, TRUTH
+from testbed.pages.axes import marked
+from testbed.pages.palette import FILTERS, SENSORS, SOLID, TRUTH, Mark
 from testbed.pages.svg import INK, STYLE
 from testbed.units import CELSIUS, DEG_H
 
@@ -23,13 +24,14 @@ if TYPE_CHECKING:
     from testbed.compensation.record import GyroRecord
     from testbed.drift.findings import Audit
     from testbed.drift.quality import Quality
+    from testbed.pages.palette import Dash
     from testbed.signals import FloatArray
 
 SIZE_IN = (9.2, 4.6)
 # Colour and line of each curve of an Allan figure, by what it is.
-CURVES = {
-    "record": (SENSORS[0], "-"),
-    "compensated": (FILTERS[0], "-"),
+CURVES: dict[str, tuple[str, Dash]] = {
+    "record": (SENSORS[0], (0, None)),
+    "compensated": (FILTERS[0], (0, None)),
     "equal low-pass": (FILTERS[1], (0, (5, 2))),
     "oracle": (TRUTH, (0, (1.2, 1.6))),
 }
@@ -81,9 +83,7 @@ def drift_figure(record: GyroRecord, compensated: FloatArray, drift: FloatArray 
     return figure
 
 
-def residual_allan_figure(
-    qualities: Mapping[str, Quality], styles: Mapping[str, tuple[object, object]] = CURVES
-) -> Figure:
+def residual_allan_figure(qualities: Mapping[str, Quality], styles: Mapping[str, tuple[str, Dash]] = CURVES) -> Figure:
     """Draw Allan deviations with their 95 % bands, and the fitted sum of each that the noise model describes.
 
     Parameters
@@ -101,24 +101,26 @@ def residual_allan_figure(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=SIZE_IN, layout="constrained")
         axes = figure.subplots()
-        for name, quality in qualities.items():
-            _draw_curve(axes, name, quality, *styles[name])
+        for turn, (name, quality) in enumerate(qualities.items()):
+            color, dash = styles[name]
+            _draw_curve(axes, name, quality, color, Mark(dash, SOLID[turn % len(SOLID)], turn))
         axes.set(xscale="log", yscale="log", xlabel="averaging time τ [s]", ylabel="Allan deviation [deg/h]")
         axes.grid(visible=True, which="major")
         figure.legend(loc="outside upper left", ncols=2, fontsize=8)
     return figure
 
 
-def _draw_curve(axes: Axes, name: str, quality: Quality, color: object, line: object) -> None:
+def _draw_curve(axes: Axes, name: str, quality: Quality, color: str, mark: Mark) -> None:
     curve = quality.curve
     axes.fill_between(curve.tau, curve.lower / DEG_H, curve.upper / DEG_H, color=color, alpha=0.13, linewidth=0)
+    style = marked(mark, color, curve.tau.size)
     note = "" if quality.fit is not None else " (no Q, N, B: the noise model does not describe it)"
-    axes.plot(curve.tau, curve.deviation / DEG_H, color=color, linestyle=line, linewidth=1.4, label=name + note)
+    axes.plot(curve.tau, curve.deviation / DEG_H, color=color, linewidth=1.4, label=name + note, **style)
     if quality.fit is not None:
         part = curve.between(0.0, quality.fitted_to)
         squares = zip(_TERMS, quality.fit.squares, strict=True)
         total = np.sqrt(sum(term_variance(part, term, square) for term, square in squares))
-        axes.plot(part.tau[::3], total[::3] / DEG_H, "o", color=color, markersize=2.6, markerfacecolor="none")
+        axes.plot(part.tau[::3], total[::3] / DEG_H, mark.marker, color=color, markersize=2.6, markerfacecolor="none")
 
 
 def gain_figure(audit: Audit) -> Figure:

@@ -17,8 +17,9 @@ from testbed.allan.fit import judge_fit, term_variance
 from testbed.errors import Problem, ScenarioError
 from testbed.judging.allan_words import data_sheet, remarks_on
 from testbed.judging.rounding import is_rounding, rounding_text, without_rounding
+from testbed.pages.axes import marked
 from testbed.pages.numbers import significant
-from testbed.pages.palette import FILTERS, SENSORS
+from testbed.pages.palette import FILTERS, SENSORS, SOLID, Mark
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
@@ -253,11 +254,16 @@ def _draw_term(axes: Axes, analysis: Analysis, term: Term, deviation: np.ndarray
     coefficient, tau = analysis.coefficient(term), analysis.fitted.tau
     if coefficient.identified:
         label = f"{term.letter} = {term.text(coefficient.value)} {term.unit}"
-        axes.plot(tau, deviation, color=term.color, linewidth=1.0, linestyle=(0, (5, 2)), label=label)
+        axes.plot(tau, deviation, linewidth=1.0, label=label, **_style(term, (5, 2), tau.size))
     elif deviation.any():
         # In the sum, though too small to be told from nothing.
         label = f"{term.letter} < {term.text(coefficient.upper)} {term.unit}"
-        axes.plot(tau, deviation, color=term.color, linewidth=0.8, linestyle=":", label=label)
+        axes.plot(tau, deviation, linewidth=0.8, label=label, **_style(term, (1.2, 1.6), tau.size))
+
+
+def _style(term: Term, dashes: tuple[float, ...], n_points: int) -> dict[str, Any]:
+    turn = TERMS.index(term)
+    return {"color": term.color} | marked(Mark((0, dashes), SOLID[turn], turn), term.color, n_points)
 
 
 def _decades(deviation: np.ndarray) -> tuple[float, float]:

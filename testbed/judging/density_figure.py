@@ -8,7 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from testbed.pages.palette import color_of
+from testbed.pages.axes import marked
+from testbed.pages.palette import color_of, series_marks
 from testbed.pages.svg import STYLE
 from testbed.units import DEG
 
@@ -28,7 +29,7 @@ def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
     Parameters
     ----------
     estimates : sequence of RateDensityEstimate
-        Each in the colour of its name.
+        Each in the colour, dashes and mark of its name.
 
     Returns
     -------
@@ -38,15 +39,18 @@ def density_figure(estimates: Sequence[RateDensityEstimate]) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=_SIZE_IN, layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
-        for one in estimates:
-            color, shown = color_of(one.record.signal or f"columns/{one.record.name}"), _shown(one.freq_hz.size)
+        groups = [one.record.signal or f"columns/{one.record.name}" for one in estimates]
+        marks = series_marks(groups)
+        for one, group in zip(estimates, groups, strict=True):
+            color, shown = color_of(group), _shown(one.freq_hz.size)
+            style = {"color": color} | (marked(marks[group], color, shown.size) if group in marks else {})
             freq, density = one.freq_hz[shown], np.sqrt(one.density[shown]) / DEG
             low, high = np.sqrt(one.limits)
             top.fill_between(freq, density * low, density * high, color=color, alpha=0.25, linewidth=0)
-            top.plot(freq, density, color=color, linewidth=0.9, label=one.record.name.replace("$", r"\$"))
+            top.plot(freq, density, **style, linewidth=0.9, label=one.record.name.replace("$", r"\$"))
             rate, angle = one.cumulative()
-            middle.plot(freq, rate[shown] / DEG, color=color, linewidth=1.1)
-            bottom.plot(freq, angle[shown] * 1e6, color=color, linewidth=1.1)
+            middle.plot(freq, rate[shown] / DEG, **style, linewidth=1.1)
+            bottom.plot(freq, angle[shown] * 1e6, **style, linewidth=1.1)
         sides = "one-sided" if estimates[0].sides == 1 else "two-sided"
         top.set(xscale="log", yscale="log", ylabel=f"density, {sides} [deg/s/√Hz]")
         middle.set(ylabel="rms up to f [deg/s]")

@@ -54,8 +54,8 @@ DASHES: tuple[Dash, ...] = (
     (0, (7, 1.2, 1.5, 1.2)),
     (0, (10, 1.2, 1.5, 1.2, 1.5, 1.2)),
 )
-_OPEN, _SOLID = ("x", "+", "1", "2"), ("o", "s", "^", "D", "v", "P", "*", "<", "X", ">", "p", "h")
-_MARKERS = {"sensors": _OPEN, "fusion": _SOLID, "columns": _SOLID}
+_OPEN, SOLID = ("x", "+", "1", "2"), ("o", "s", "^", "D", "v", "P", "*", "<", "X", ">", "p", "h")
+_MARKERS = {"sensors": _OPEN, "fusion": SOLID, "columns": SOLID}
 # Relative luminance that stands out 3:1 on white and on the viewer's dark background.
 _LUMINANCE = 0.2
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from testbed.campaigns.regression.leaderboard import standings
-from testbed.pages.axes import WIDTH_IN, arrange, label
-from testbed.pages.palette import color_of
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.palette import color_of, series_marks
 from testbed.pages.svg import STYLE
 from testbed.pages.template import render
 from testbed.runs.atomic import write_text
@@ -92,11 +92,13 @@ def history_figure(history: Sequence[Mapping[str, Any]], campaign: str) -> Figur
         figure = Figure(figsize=(WIDTH_IN, 3.6))
         axes = figure.subplots()
         handles: list[Line2D | Patch] = []
-        for name in dict.fromkeys(name for one in found for name in one):
+        names = dict.fromkeys(name for one in found for name in one)
+        marks = series_marks(f"fusion/{name}" for name in names)
+        for name in names:
             values = [one[name].over_optimum if name in one else np.nan for one in found]
-            handles += axes.plot(
-                range(1, len(entries) + 1), values, "o-", color=color_of(f"fusion/{name}"), label=label(name)
-            )
+            color = color_of(f"fusion/{name}")
+            style = marked(marks[f"fusion/{name}"], color)
+            handles += axes.plot(range(1, len(entries) + 1), values, color=color, label=label(name), **style)
         axes.set_yscale("log")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("entry")

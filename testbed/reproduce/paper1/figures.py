@@ -9,6 +9,7 @@ import numpy as np
 
 from testbed.fusion.filters.arw_shakf import ArwShakfParameters
 from testbed.pages import palette
+from testbed.pages.axes import marked
 from testbed.pages.svg import INK
 from testbed.reproduce.drawing import (
     DOTTED,
@@ -49,7 +50,7 @@ LABELS = {
     "arw_shakf_literal": "ARW-SHAKF as printed",
 }
 # Beside the color, so that lines can be told apart without it.
-DASHES: dict[str, Any] = {"shakf": (0, (4, 1.2)), "arw_shakf": (0, None), "arw_shakf_literal": DOTTED}
+MARKS = palette.series_marks(COLORS)
 # Which signal each figure of a run shows, and which of its tables.
 RUNS = {
     "figure_8": ("0.5 Hz", "rates"),
@@ -103,11 +104,13 @@ def draw_slip_error(table: Table) -> Figure:
     figure, (axes,) = panels(2.8)
     handles = []
     channels = {"0p036t": "0.036 T, 10 mm", "0p1t": "0.1 T, 10 mm", "sx300": "0.448 T, 15 mm (sx300)"}
-    for (name, label), color in zip(
-        channels.items(), (palette.SENSORS[0], palette.TRUTH, palette.FILTERS[1]), strict=True
-    ):
-        handles += axes.plot(table["frequency_hz"], table[f"full_{name}"], color=color, linewidth=1.3, label=label)
-        axes.plot(table["frequency_hz"], table[f"one_mode_{name}"], color=color, linewidth=1.0, linestyle=(0, (3, 1.5)))
+    colors, freq = (palette.SENSORS[0], palette.TRUTH, palette.FILTERS[1]), table["frequency_hz"]
+    for turn, ((name, label), color) in enumerate(zip(channels.items(), colors, strict=True)):
+        full, one_mode = (
+            marked(palette.Mark((0, dash), palette.SOLID[turn], turn), color, freq.size) for dash in (None, (3, 1.5))
+        )
+        handles += axes.plot(freq, table[f"full_{name}"], color=color, linewidth=1.3, label=label, **full)
+        axes.plot(freq, table[f"one_mode_{name}"], color=color, linewidth=1.0, **one_mode)
     handles += [key("full equation (2)", linewidth=1.3), key("one mode (6)", linestyle=(0, (3, 1.5)))]
     axes.set_ylim(1e-4, 1.6)
     logarithmic(axes, "xy")
@@ -124,16 +127,14 @@ def draw_bode(curves: Table, measured: Table) -> Figure:
     figure, (gain, phase) = panels(3.4, 2)
     freq, handles = curves["frequency_hz"], []
     for name in SENSORS:
-        color = COLORS[f"sensors/{name}"]
+        color, mark = COLORS[f"sensors/{name}"], MARKS[f"sensors/{name}"]
+        points = {"color": color, **marked(mark, color), "linestyle": "none"}
         for axes, what in ((gain, "gain_db"), (phase, "phase_deg")):
-            axes.plot(freq, curves[f"{name}_{what}"], color=color)
+            axes.plot(freq, curves[f"{name}_{what}"], color=color, linestyle=mark.dash)
             axes.plot(freq, curves[f"{name}_eq39_{what}"], color=INK, linewidth=0.9, linestyle=":")
-            axes.plot(measured["frequency_hz"], measured[f"{name}_{what}"], **MARKER, markeredgecolor=color)
-        handles.append(key(LABELS[name], color=color))
-    handles += [
-        key("equation (39)", linewidth=0.9, linestyle=":"),
-        key("stepped sine", **MARKER, markeredgecolor=INK),
-    ]
+            axes.plot(measured["frequency_hz"], measured[f"{name}_{what}"], **points)
+        handles.append(key(LABELS[name], color=color, **marked(mark, color)))
+    handles += [key("equation (39)", linewidth=0.9, linestyle=":"), key("marks: stepped sine", linestyle="none")]
     gain.set_ylabel("gain [dB]")
     phase.set_ylabel("phase [deg]")
     phase.set_yticks([-90, -45, 0, 45, 90])
@@ -178,13 +179,9 @@ def draw_rates(table: Table) -> Figure:
     handles = axes.plot(
         t, table["turntable_deg_s"], color=palette.COMMANDED, linewidth=3.4, alpha=0.6, label="turntable"
     )
-    for name, dashes in (("mems_gyro", (0, (5, 1.3))), ("mhd_ars", (0, (2.2, 1)))):
-        handles += axes.plot(
-            t, table[f"{name}_deg_s"], color=COLORS[f"sensors/{name}"], linestyle=dashes, label=LABELS[name]
-        )
-    handles += axes.plot(
-        t, table["arw_shakf_deg_s"], color=COLORS["fusion/arw_shakf"], linewidth=0.9, label="fused (ARW-SHAKF)"
-    )
+    for name in ("mems_gyro", "mhd_ars"):
+        handles += axes.plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(f"sensors/{name}", t.size))
+    handles += axes.plot(t, table["arw_shakf_deg_s"], label="fused (ARW-SHAKF)", **_style("fusion/arw_shakf", t.size))
     in_time(axes, t)
     axes.set_ylabel("rate [deg/s]")
     legend(figure, handles, 2)
@@ -201,7 +198,7 @@ def draw_fused(table: Table) -> Figure:
     )
     rows[0].set_ylabel("rate [deg/s]")
     for axes, name in zip(rows[1:], FOLLOWERS, strict=True):
-        handles += rows[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(name))
+        handles += rows[0].plot(t, table[f"{name}_deg_s"], label=LABELS[name], **_style(f"fusion/{name}", t.size))
         milli, color = 1e3 * table[f"{name}_error_deg_s"], COLORS[f"fusion/{name}"]
         axes.plot(t, milli, color=color, linewidth=0.4, alpha=0.4)
         axes.plot(t, smooth(milli, t, SMOOTH_S), color=color, linewidth=1.2)
@@ -217,27 +214,27 @@ def draw_fused(table: Table) -> Figure:
 def draw_adaptation(table: Table) -> Figure:
     """Draw figure 12 or 15; argument as the table `adaptation` of `following`."""
     figure, rows = panels(4.8, 3)
-    handles = []
+    handles, t = [], table["time_s"]
     for axes, (sensor, index) in zip(rows, (("mems_gyro", 11), ("mhd_ars", 22)), strict=False):
         handles = [
-            axes.plot(table["time_s"], table[f"{name}_R_{sensor}_deg2_s2"], label=LABELS[name], **_style(name))[0]
+            axes.plot(t, table[f"{name}_R_{sensor}_deg2_s2"], label=LABELS[name], **_style(f"fusion/{name}", t.size))[0]
             for name in FOLLOWERS
         ]
         axes.set_title(f"$R_{{{index}}}$, {LABELS[sensor]}", loc="left")
         axes.set_ylabel("$R$ [(deg/s)$^2$]")
     for sensor in SENSORS:
         fading, printed = (table[f"{name}_N_{sensor}_deg2_s2"] for name in FOLLOWERS[1:])
-        rows[2].plot(table["time_s"], fading, color=COLORS[f"sensors/{sensor}"])
-        rows[2].plot(table["time_s"], printed, color=INK, linewidth=0.9, linestyle=DOTTED)
+        rows[2].plot(t, fading, **_style(f"sensors/{sensor}", t.size))
+        rows[2].plot(t, printed, color=INK, linewidth=0.9, linestyle=DOTTED)
         place: dict[str, Any] = {"xytext": (-2, -6), "textcoords": "offset points", "ha": "right", "va": "top"}
-        rows[2].annotate(LABELS[sensor], (table["time_s"][-1], fading[-1]), **place)
-    rows[2].set_title("$N_k$ (solid: fading memory, dotted: as printed)", loc="left")
+        rows[2].annotate(LABELS[sensor], (t[-1], fading[-1]), **place)
+    rows[2].set_title("$N_k$ (marks: fading memory, dotted: as printed)", loc="left")
     rows[2].set_ylabel("$N_k/\\Delta T$ [(deg/s)$^2$]")
     rows[2].set_ylim(3e-7, 6e-5)  # the same in both figures
     rows[2].set_xlabel("time [s]")
     for axes in rows:
         logarithmic(axes, "xy")
-    rows[2].set_xlim(table["time_s"][0], table["time_s"][-1])
+    rows[2].set_xlim(t[0], t[-1])
     legend(figure, handles, 2)
     return figure
 
@@ -255,8 +252,9 @@ def _band_limits(sensor: str) -> tuple[float, float]:
     return low / DEG**2, high / DEG**2
 
 
-def _style(name: str) -> dict[str, Any]:
-    return {"color": COLORS[f"fusion/{name}"], "linestyle": DASHES[name], "linewidth": 1.0}
+def _style(group: str, n_points: int) -> dict[str, Any]:
+    color = COLORS[group]
+    return {"color": color, "linewidth": 1.0, **marked(MARKS[group], color, n_points)}
 
 
 def _write(out: Path, name: str, tables: Mapping[str, Table], figure: Figure) -> str:

@@ -6,15 +6,16 @@ fused rate that follows a sine of 1 rad/s at 0.5, 5 and 50 Hz, 11 the noise dens
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 
 from testbed.fusion.belief import load_belief
 from testbed.pages import palette
+from testbed.pages.axes import marked
 from testbed.pages.svg import INK
-from testbed.reproduce.drawing import DOTTED, LIMIT, PRINT, in_time, key, legend, logarithmic, panels, save
+from testbed.reproduce.drawing import LIMIT, PRINT, in_time, key, legend, logarithmic, panels, save
 from testbed.reproduce.paper2.rivals import SENSORS
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
@@ -31,10 +32,9 @@ if TYPE_CHECKING:
 
     Table = dict[str, FloatArray]
 
-COLORS = {name: palette.color_of(f"sensors/{name}") for name in SENSORS} | {
-    "fused": palette.color_of("fusion/allan_srkf"),
-    "rate": palette.color_of("truth"),
-}
+GROUPS = {name: f"sensors/{name}" for name in SENSORS} | {"fused": "fusion/allan_srkf", "rate": "truth"}
+COLORS = {name: palette.color_of(group) for name, group in GROUPS.items()}
+MARKS = palette.series_marks(GROUPS.values())
 LABELS = {"mems_gyro": "MEMS gyro", "mhd_ars": "MHD ARS", "fused": "fused", "rate": "true rate"}
 BELIEVED = {"color": INK, "linewidth": 0.9, "linestyle": LIMIT}
 FOLLOWED_HZ = {"figure_7": 0.5, "figure_8": 5.0, "figure_9": 50.0}
@@ -102,7 +102,7 @@ def draw_both_responses(table: Table) -> Figure:
     figure, (gain, phase) = panels(4.2, 2)
     for name in SENSORS:
         # The belief lies on the sensor: dashed in ink over a wide line, so that both are seen.
-        for of, style in ((name, {"color": COLORS[name], "linewidth": 2.4}), (f"{name}_believed", BELIEVED)):
+        for of, style in ((name, {**_style(name, 251), "linewidth": 2.4}), (f"{name}_believed", BELIEVED)):
             gain.plot(table["frequency_hz"], table[f"{of}_gain"], **style)
             phase.plot(table["frequency_hz"], table[f"{of}_phase_deg"], **style)
     logarithmic(gain, "xy")
@@ -112,7 +112,7 @@ def draw_both_responses(table: Table) -> Figure:
     phase.set_ylabel("phase [deg]")
     phase.set_xlabel("frequency [Hz]")
     phase.set_xlim(table["frequency_hz"][0], table["frequency_hz"][-1])
-    names = [key(LABELS[name], color=COLORS[name]) for name in SENSORS]
+    names = [key(LABELS[name], **_style(name)) for name in SENSORS]
     legend(figure, [*names, key("believed", **BELIEVED)], 3)
     return figure
 
@@ -122,14 +122,14 @@ def draw_followed(table: Table) -> Figure:
     """Draw one of figures 7 to 9 from the table of `followed`: rates above, error of the fused one below."""
     figure, (rates, error) = panels(3.8, 2)
     for name in ("rate", *SENSORS):
-        rates.plot(table["t"], table[name], color=COLORS[name], linewidth=2.2 if name == "rate" else 1.0)
-    rates.plot(table["t"], table["fused"], color=COLORS["fused"], linewidth=1.2, linestyle=DOTTED)
+        width = 2.2 if name == "rate" else 1.0
+        rates.plot(table["t"], table[name], linewidth=width, **_style(name, table["t"].size))
+    rates.plot(table["t"], table["fused"], linewidth=1.2, **_style("fused", table["t"].size))
     error.plot(table["t"], table["fused"] - table["rate"], color=COLORS["fused"], linewidth=0.9)
     rates.set_ylabel("rate [deg/s]")
     error.set_ylabel("fused - true [deg/s]")
     in_time(error, table["t"])
-    names = [key(LABELS[name], color=COLORS[name]) for name in ("rate", *SENSORS)]
-    legend(figure, [*names, key(LABELS["fused"], color=COLORS["fused"], linestyle=DOTTED)], 2)
+    legend(figure, [key(LABELS[name], **_style(name)) for name in ("rate", *SENSORS, "fused")], 2)
     return figure
 
 
@@ -138,16 +138,21 @@ def draw_noise(table: Table) -> Figure:
     """Draw figure 11: root densities at standstill."""
     figure, (axes,) = panels(2.8)
     for name in ("mems_gyro", "mhd_ars", "fused"):
-        axes.plot(table["frequency_hz"], np.sqrt(table[name]) / DEG, color=COLORS[name], linewidth=1.2)
+        axes.plot(table["frequency_hz"], np.sqrt(table[name]) / DEG, linewidth=1.2, **_style(name, table[name].size))
     referred = np.sqrt(table["mhd_ars_input_referred"]) / DEG
     axes.plot(table["frequency_hz"], referred, color=COLORS["mhd_ars"], linewidth=1.0, linestyle=LIMIT)
     logarithmic(axes, "xy")
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("noise [deg/s/$\\sqrt{\\mathrm{Hz}}$]")
     axes.set_xlim(table["frequency_hz"][0], table["frequency_hz"][-1])
-    names = [key(LABELS[name], color=COLORS[name]) for name in ("mems_gyro", "mhd_ars", "fused")]
+    names = [key(LABELS[name], **_style(name)) for name in ("mems_gyro", "mhd_ars", "fused")]
     legend(figure, [*names, key("MHD ARS, as a rate", color=COLORS["mhd_ars"], linestyle=LIMIT)], 2)
     return figure
+
+
+def _style(name: str, n_points: int | None = None) -> dict[str, Any]:
+    color, mark = COLORS[name], MARKS.get(GROUPS[name])
+    return {"color": color} | (marked(mark, color, n_points) if mark else {})
 
 
 def _write(out: Path, name: str, table: Table, draw: Callable[[Table], Figure]) -> str:

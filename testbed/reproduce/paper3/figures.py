@@ -14,9 +14,10 @@ from testbed.compensation.entropy import multiscale_permutation_entropy, multisc
 from testbed.compensation.grouping import group_modes, mean_period
 from testbed.drift.quality import timed_means
 from testbed.drift.table_2 import ORIGINAL, PIPELINE
-from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH
+from testbed.pages.axes import marked
+from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, SOLID, TRUTH, Dash, Mark
 from testbed.pages.svg import INK
-from testbed.reproduce.drawing import DOTTED, LIMIT, MARKER, PRINT, key, legend, logarithmic, panels, save
+from testbed.reproduce.drawing import DOTTED, LIMIT, PRINT, key, legend, logarithmic, panels, save
 from testbed.reproduce.paper1.data import csv_text
 from testbed.runs.atomic import write_text
 from testbed.units import CELSIUS, DEG_H
@@ -41,13 +42,13 @@ GROUPS = ("noise", "mixed", "drift")
 _COLORS = dict(zip(GROUPS, (SENSORS[0], FILTERS[1], TRUTH), strict=True))
 HONEST = "gradient, 2 other cycles"
 # Colour and line of what figures 13 and 14 show.
-METHODS: dict[str, tuple[str, Any]] = {
-    ORIGINAL: (COMMANDED, "-"),
-    "AKF [22]": (SENSORS[0], "-"),
+METHODS: dict[str, tuple[str, Dash]] = {
+    ORIGINAL: (COMMANDED, (0, None)),
+    "AKF [22]": (SENSORS[0], (0, None)),
     "OLMD-KPCA": (SENSORS[2], (0, (5, 2))),
     "CEEMDAN-LWT": (SENSORS[1], (0, (3, 1.2))),
-    PIPELINE: (FILTERS[2], "-"),
-    HONEST: (FILTERS[0], "-"),
+    PIPELINE: (FILTERS[2], (0, None)),
+    HONEST: (FILTERS[0], (0, None)),
 }
 _BINS = 400
 
@@ -204,14 +205,16 @@ def draw_modes(found: Decomposed) -> Figure:
     hours = (np.arange(_BINS) + 0.5) * n_bin / found.sample_rate_hz / 3600.0
     for k, (each, row) in enumerate(zip(axes, found.modes, strict=True)):
         stretches = (row - (row.mean() if k == len(axes) - 1 else 0.0))[: _BINS * n_bin].reshape(_BINS, n_bin) / DEG_H
-        color = _COLORS[found.group_of(k)]
+        group = found.group_of(k)
+        color = _COLORS[group]
+        # In words too: printed in grey the colours are one.
+        each.text(0.995, 0.93, group, transform=each.transAxes, ha="right", va="top", fontsize=5.0)
         each.fill_between(hours, stretches.min(axis=1), stretches.max(axis=1), color=color, linewidth=0.6)
         each.set_ylabel("r" if k == len(axes) - 1 else f"{k + 1}", rotation=0, labelpad=8)
         each.tick_params(labelsize=5.0)
         each.locator_params(axis="y", nbins=2)
     _in_hours(axes[-1], hours)
-    handles = [key(f"{name}", color=color) for name, color in _COLORS.items()]
-    legend(figure, [*handles, key("rate [deg/h]", linestyle="none")], 4)
+    legend(figure, [key("rate [deg/h]", linestyle="none")], 1)
     return figure
 
 
@@ -221,12 +224,13 @@ def draw_entropies(table: Table, found: Decomposed) -> Figure:
     figure, (axes,) = panels(2.6)
     lines = {
         "permutation, scale 1": ("permutation_entropy", SENSORS[0], DOTTED),
-        f"permutation, scale {SCALE}": (f"permutation_entropy_{SCALE}", SENSORS[0], "-"),
-        f"sample, scale {SCALE}": (f"sample_entropy_{SCALE}", FILTERS[2], "-"),
+        f"permutation, scale {SCALE}": (f"permutation_entropy_{SCALE}", SENSORS[0], (0, None)),
+        f"sample, scale {SCALE}": (f"sample_entropy_{SCALE}", FILTERS[2], (0, None)),
     }
-    for column, color, line in lines.values():
-        axes.plot(table["mode"], table[column], color=color, linestyle=line, linewidth=0.9)
-        axes.plot(table["mode"], table[column], **MARKER, markeredgecolor=color)
+    handles = []
+    for turn, (name, (column, color, dash)) in enumerate(lines.items()):
+        style = marked(Mark(dash, SOLID[turn], turn), color)
+        handles += axes.plot(table["mode"], table[column], color=color, linewidth=0.9, label=name, **style)
     for name, color in _COLORS.items():
         rows = [k + 1 for k in getattr(found.groups, name) if k + 1 <= table["mode"].size]
         if rows:
@@ -238,7 +242,7 @@ def draw_entropies(table: Table, found: Decomposed) -> Figure:
     axes.set(xlabel="mode", ylabel="entropy [-]", xlim=(0.5, table["mode"].size + 0.5))
     axes.set_ylim(bottom=0.0)
     axes.locator_params(axis="x", integer=True)
-    legend(figure, [key(label, color=color, linestyle=line) for label, (_, color, line) in lines.items()], 2)
+    legend(figure, handles, 2)
     return figure
 
 
@@ -264,12 +268,14 @@ def draw_deviations(table: Table) -> Figure:
     figure, (axes,) = panels(3.4)
     styles = {**METHODS, "oracle": (TRUTH, DOTTED)}
     names = [name for name in table if name != "tau_s"]
-    for name in names:
-        color, line = styles[name]
-        axes.plot(table["tau_s"], table[name], color=color, linestyle=line, linewidth=1.0)
+    handles = []
+    for turn, name in enumerate(names):
+        color, dash = styles[name]
+        style = marked(Mark(dash, SOLID[turn], turn), color, table["tau_s"].size)
+        handles += axes.plot(table["tau_s"], table[name], color=color, linewidth=1.0, label=name, **style)
     logarithmic(axes, "xy")
     axes.set(xlabel="averaging time [s]", ylabel="Allan deviation [deg/h]")
-    legend(figure, [key(name, color=styles[name][0], linestyle=styles[name][1]) for name in names], 2)
+    legend(figure, handles, 2)
     return figure
 
 

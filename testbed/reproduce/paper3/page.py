@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from testbed.drift.figures import SIZE_IN, residual_allan_figure
 from testbed.drift.findings import DRIFT_PERIOD, LEAST_GAIN
-from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, TRUTH
+from testbed.pages.axes import marked
+from testbed.pages.palette import COMMANDED, FILTERS, SENSORS, SOLID, TRUTH, Mark
 from testbed.pages.svg import STYLE
 from testbed.pages.template import render
 
@@ -17,21 +18,22 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from testbed.drift.findings import Audit
+    from testbed.pages.palette import Dash
 
 # Colour and line of the methods, in the order of the table; the oracle last.
-_STYLES = (
-    (SENSORS[0], "-"),
+_STYLES: tuple[tuple[str, Dash], ...] = (
+    (SENSORS[0], (0, None)),
     (COMMANDED, (0, (1.2, 1.6))),
     (COMMANDED, (0, (5, 2))),
-    (SENSORS[2], "-"),
+    (SENSORS[2], (0, None)),
     (SENSORS[2], (0, (5, 2))),
     (SENSORS[2], (0, (1.2, 1.6))),
-    (FILTERS[2], "-"),
+    (FILTERS[2], (0, None)),
     (FILTERS[3], (0, (7, 1.2, 1.5, 1.2))),
     (SENSORS[1], (0, (3, 1.2))),
     (FILTERS[4], (0, (3, 1.2))),
     (FILTERS[1], (0, (5, 2))),
-    (FILTERS[0], "-"),
+    (FILTERS[0], (0, None)),
 )
 
 
@@ -49,7 +51,7 @@ def page(rows: Sequence[Mapping[str, Any]], audits: Mapping[str, Audit], folders
     seeds : int
         Over which the rows are medians.
     """
-    styles: dict[str, tuple[object, object]] = dict(zip(audits, _STYLES, strict=True))
+    styles: dict[str, tuple[str, Dash]] = dict(zip(audits, _STYLES, strict=True))
     oracle = next(iter(audits.values())).oracle
     qualities = {name: audit.after for name, audit in audits.items()}
     if oracle is not None:
@@ -61,14 +63,15 @@ def page(rows: Sequence[Mapping[str, Any]], audits: Mapping[str, Audit], folders
     return render("paper3.html.j2", drawn, rows=rows, seeds=seeds, folders=folders)
 
 
-def _gain_figure(audits: Mapping[str, Audit], styles: Mapping[str, tuple[object, object]]) -> Figure:
+def _gain_figure(audits: Mapping[str, Audit], styles: Mapping[str, tuple[str, Dash]]) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(SIZE_IN[0], 3.8), layout="constrained")
         axes = figure.subplots()
-        for name, audit in audits.items():
-            color, line = styles[name]
+        for turn, (name, audit) in enumerate(audits.items()):
+            color, dash = styles[name]
             period = [found.period for found in audit.gains]
-            axes.plot(period, [found.gain for found in audit.gains], color=color, linestyle=line, label=name)
+            style = marked(Mark(dash, SOLID[turn % len(SOLID)], turn), color, len(period))
+            axes.plot(period, [found.gain for found in audit.gains], color=color, label=name, **style)
         last = period[-1] * 1.2
         axes.axvspan(DRIFT_PERIOD, last, color=SENSORS[3], alpha=0.10, linewidth=0)
         axes.plot([DRIFT_PERIOD, last], [LEAST_GAIN] * 2, color="#c00000", linewidth=0.9)
