@@ -150,7 +150,9 @@ def deflection_power(
 def _passed(freq: FloatArray, mirror: Mirror) -> ComplexArray:
     """Return the deflection over the estimated angle."""
     s = 2j * np.pi * freq
-    passed = mirror.dynamics.response(freq) * np.exp(-s * mirror.latency) * (1.0 + sum(mirror.lead_times) * s)
+    passed: ComplexArray = (
+        mirror.dynamics.response(freq) * np.exp(-s * mirror.latency) * (1.0 + sum(mirror.lead_times) * s)
+    )
     if mirror.rate is not None:
         passed = passed * np.sinc(freq / mirror.rate) * np.exp(-0.5 * s / mirror.rate)
     return passed
@@ -162,7 +164,8 @@ def _left(
     """Return s [rad/s], and the residual over the true angle."""
     T = 1.0 + response.at(response.error, freq)
     left: ComplexArray = gains.sensitivity(freq) * (1.0 - _passed(freq, mirror) * T)
-    return 2j * np.pi * freq, left
+    s = np.asarray(2j * np.pi * freq, dtype=np.complex128)
+    return s, left
 
 
 def _drawn(

@@ -286,7 +286,8 @@ def test_workers_of_this_machine_find_the_cache_warm_and_those_elsewhere_are_lef
     warmed = []
 
     def no_client(*_):
-        raise RunError("enough")
+        msg = "enough"
+        raise RunError(msg)
 
     monkeypatch.setattr("testbed.campaigns.size.warm", warmed.append)
     monkeypatch.setattr("testbed.campaigns.engine._client", no_client)
@@ -298,7 +299,8 @@ def test_workers_of_this_machine_find_the_cache_warm_and_those_elsewhere_are_lef
 
 def test_a_case_that_fails_at_its_beginning_does_not_stop_the_warming(done, monkeypatch):
     def fails(*_):
-        raise RunError("no")
+        msg = "no"
+        raise RunError(msg)
 
     monkeypatch.setattr("testbed.campaigns.size.Lockstep", fails)
     warm(done[0])

@@ -180,7 +180,7 @@ def test_a_mirror_whose_end_is_near_is_told_with_numbers(found):
     for one in search(replace(asked, mirrors=ended)).candidates:
         stroke, rate = one.doubts
         # The line of 20 urad alone has an rms of 14.1, the mirror follows it.
-        assert float(stroke.split()[6]) > 3 * 14.0
+        assert float(stroke.split()[7]) > 3 * 14.0
         assert "beyond its end at 1 urad" in stroke
         assert "rad/s" in rate
     free = search(replace(asked, mirrors={"plain": asked.mirrors["plain"]}))
