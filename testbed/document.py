@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Model = TypeVar("Model", bound=BaseModel)
 
 _MOST_FINDINGS = 100
+_COUNTED = {"too_short", "too_long"}
 
 
 class Document:
@@ -134,10 +135,26 @@ def _message(detail: Mapping[str, Any], model: type[BaseModel]) -> str:
         return "is required"
     if kind == "quantity":
         return str(detail["msg"])
+    if kind in _COUNTED:
+        return _count_message(detail)
     reason = str(detail["msg"]).removeprefix("Value error, ")
     if kind == "value_error":
         return reason
     return f"{reason[0].lower()}{reason[1:]}, got {quoted(detail['input'])}"
+
+
+def _count_message(detail: Mapping[str, Any]) -> str:
+    """Return the message for a list or mapping of too few or too many entries, with the remedy."""
+    context = detail["ctx"]
+    if detail["type"] == "too_short":
+        least = context["min_length"]
+        return f"expected at least {least} {_entries(least)}, got {context['actual_length']}: add some, or leave it out"
+    most, count = context["max_length"], context["actual_length"] or "more"
+    return f"expected at most {most} {_entries(most)}, got {count}: leave some out"
+
+
+def _entries(count: int) -> str:
+    return "entry" if count == 1 else "entries"
 
 
 def _known(model: type[BaseModel], loc: tuple[str | int, ...]) -> Iterable[str]:

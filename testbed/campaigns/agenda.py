@@ -69,7 +69,7 @@ class Agenda:
         done: Iterable[tuple[int, int]],
         squares: Mapping[tuple[int, int], Mapping[str, float]] | None = None,
     ) -> None:
-        self._study = study
+        self.study = study
         self._done: dict[int, set[int]] = {}
         for number, seed in done:
             self._done.setdefault(number, set()).add(seed)
@@ -83,7 +83,7 @@ class Agenda:
     @property
     def runs(self) -> int:
         """Runs of the whole study at the most."""
-        return len(self._study.cases) * len(self._study.seeds)
+        return len(self.study.cases) * len(self.study.seeds)
 
     def next(self) -> Task | None:
         """Return a task, None if none waits now."""
@@ -109,27 +109,27 @@ class Agenda:
             elif row["kind"] == "filter" and row["rmse_deg_s"] is not None:
                 self._squares.setdefault((task.case.number, row["seed"]), {})[row["source"]] = row["rmse_deg_s"] ** 2
         self._done.setdefault(task.case.number, set()).update(task.seeds)
-        if self._study.precision is not None:
+        if self.study.precision is not None:
             self._continue(task.case, task.chunk + 1)
 
     def _continue(self, case: Variation, chunk: int) -> None:
         """Queue what is next of a case from a chunk on: all of it, or one chunk where a precision decides."""
-        seeds = self._study.seeds
+        seeds = self.study.seeds
         for k in range(chunk, -(-len(seeds) // CHUNK)):
-            if self._study.precision is not None and k > 0 and self._precise(case.number, seeds[: k * CHUNK]):
+            if self.study.precision is not None and k > 0 and self._precise(case.number, seeds[: k * CHUNK]):
                 return
             done = self._done.get(case.number, set())
             left = tuple(seed for seed in seeds[k * CHUNK : (k + 1) * CHUNK] if seed not in done)
             if left:
                 self._waiting.append(Task(case, k, left))
-                if self._study.precision is not None:
+                if self.study.precision is not None:
                     return
 
     def _precise(self, number: int, seeds: Sequence[int]) -> bool:
         """Return whether every filter of a case is known well enough from some seeds, or it fails anyway."""
-        assert self._study.precision is not None
+        assert self.study.precision is not None
         if number in self._failed:
             return True
         known = [self._squares.get((number, seed), {}) for seed in seeds]
         columns = [np.array([one[name] for one in known if name in one]) for name in known[0]]
-        return bool(columns) and all(relative_half_width(one) <= self._study.precision for one in columns)
+        return bool(columns) and all(relative_half_width(one) <= self.study.precision for one in columns)

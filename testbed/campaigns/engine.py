@@ -58,6 +58,10 @@ def play_on_cluster(agenda: Agenda, take: Take, *, workers: int = 0, scheduler: 
     from distributed import as_completed
     from distributed.client import FutureCancelledError
 
+    from testbed.campaigns.size import warm
+
+    if scheduler is None:
+        warm(agenda.study)  # once, here: else every worker compiles for itself
     with _client(workers, scheduler) as client:
         ahead = _AHEAD * max(len(client.scheduler_info()["workers"]), workers, 1)
         running: dict[Any, Task] = {}

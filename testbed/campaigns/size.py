@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -28,6 +29,20 @@ class Size:
     cpu_seconds: float
     memory_bytes: int
     disk_bytes: int
+
+
+def warm(study: Study) -> None:
+    """Play the first moments of the first case, so that what it compiles stands in the cache that workers read.
+
+    Parameters
+    ----------
+    study : Study
+        What will be played.
+    """
+    scenario = study.cases[0].scenario
+    # A case that fails is a row with its reason, which whoever plays it writes.
+    with contextlib.suppress(Exception):
+        Lockstep([scenario], study.seeds[:1]).advance(min(_TRIED, scenario.n_time))
 
 
 def size_of(study: Study, workers: int = 1) -> Size:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from testbed.design.requirement import Requirement
     from testbed.design.search import Candidate, Design
 
+# Whether a chain is enough, and whether something is doubtful about it.
+_MET = {(True, False): "met", (True, True): "met, see below", (False, False): "", (False, True): ""}
+
 
 def prove(
     requirement: Requirement,
@@ -45,15 +48,13 @@ def prove(
         Where the words go.
     """
     from testbed.campaigns.sweep import sweep
-    from testbed.cli.progress import sweeping
+    from testbed.cli.campaign import playing, tell_size
     from testbed.design.proof import proof_study, read_proof
 
     study, place = proof_study(requirement, candidate, seeds, folder, list(plugins)), folder / "proof"
-    if output.quiet:
-        sweep(study, workers=workers, out=place)
-    else:
-        with sweeping(study.name) as told:
-            sweep(study, workers=workers, out=place, progress=told)
+    tell_size(study, workers, output)
+    with playing(study.name, output) as told:
+        sweep(study, workers=workers, out=place, **told)
     return read_proof(requirement, candidate, place)
 
 
@@ -75,11 +76,15 @@ def print_design(requirement: Requirement, design: Design) -> None:
     table = ruled("cost", *map(metric_text, metrics), "", "chain", title="none cheaper is as good [urad]")
     for one in design.pareto(bounds[0].metric):
         values = [f"{one.values[metric]:.3g}" for metric in metrics]
-        table.add_row(f"{one.cost:g}", *values, "met" if one.met else "", one.name)
+        table.add_row(f"{one.cost:g}", *values, _MET[one.met, bool(one.doubts)], one.name)
     console.print(table)
     chosen = design.chosen
     words = "no chain is enough" if chosen is None else f"chosen: {chosen.name}, cost {chosen.cost:g}"
     console.print(words, soft_wrap=True, highlight=False)
+    seen = {one.name: one for one in (*design.pareto(bounds[0].metric), *([] if chosen is None else [chosen]))}
+    for one in seen.values():
+        for doubt in one.doubts:
+            console.print(f"warning: {one.name}: {doubt}", soft_wrap=True, highlight=False)
     for name, reason in design.refused.items():
         console.print(f"left out: {name}: {reason}", soft_wrap=True, highlight=False)
 
@@ -119,6 +124,7 @@ def candidate_rows(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
             "blend": one.blend,
             "tracker": one.tracker,
             "mirror": one.mirror,
+            "doubts": list(one.doubts),
             **one.values,
         }
         for one in candidates

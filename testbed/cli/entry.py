@@ -11,6 +11,7 @@ import signal
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
+from testbed.cli.interruption import interrupted_words
 from testbed.cli.status import BAD_INPUT, FAILED, INTERNAL, INTERRUPTED, OK
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from types import FrameType
 
 _GONE = 141  # whoever read the output has gone, as in `testbed list | head -1`: 128 + SIGPIPE, as the shell says it
-_INTERRUPTED = "interrupted; nothing was left behind"
 _FULL = {errno.ENOSPC, errno.EDQUOT}
 _COMPLETION = "_TESTBED_COMPLETE"
 _SHOW_CURSOR = "\x1b[?25h"
@@ -34,7 +34,7 @@ def main() -> None:
         status = _run()
         sys.stdout.flush()
     except KeyboardInterrupt:
-        _end(_INTERRUPTED, INTERRUPTED)
+        _end(interrupted_words(), INTERRUPTED)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - each has its status
         _end_with(error, stopped)
     stopped.no_more()
@@ -79,7 +79,7 @@ class _Stopped:
         if not _is_loading(frame):
             raise KeyboardInterrupt
         cursor = _SHOW_CURSOR if sys.stderr.isatty() else ""
-        os.write(2, f"{cursor}{_INTERRUPTED}\n".encode())
+        os.write(2, f"{cursor}{interrupted_words()}\n".encode())
         os._exit(INTERRUPTED)
 
 
@@ -95,7 +95,7 @@ def _end_with(error: BaseException, stopped: _Stopped) -> NoReturn:
     from testbed.errors import RunError, ScenarioError
 
     if stopped.asked:
-        _end(_INTERRUPTED, INTERRUPTED)
+        _end(interrupted_words(), INTERRUPTED)
     if isinstance(error, ScenarioError):
         _end(f"error: {error}", BAD_INPUT)
     if isinstance(error, RunError):

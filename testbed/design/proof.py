@@ -12,10 +12,12 @@ from testbed.campaigns.renewal import code_sha256, make_way
 from testbed.campaigns.store import read_cases
 from testbed.campaigns.study import load_study
 from testbed.design.search import chosen_scenario
+from testbed.fusion.belief_file import is_belief_file
 from testbed.runs.table import metric_text
+from testbed.scenario.model import dump, resolved_fusion
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from testbed.campaigns.study import Study
@@ -69,7 +71,8 @@ def write_chosen(requirement: Requirement, candidate: Candidate, folder: Path) -
         Where to.
     """
     head = f"chosen by `testbed design`: {candidate.name}, cost {candidate.cost:g}"
-    return _write(folder / CHOSEN, head, chosen_scenario(requirement, candidate))
+    chosen = chosen_scenario(requirement, candidate)
+    return _write(folder / CHOSEN, head, {**chosen, **_without_files(requirement, candidate, chosen, folder.resolve())})
 
 
 def proof_study(
@@ -133,6 +136,32 @@ def read_proof(requirement: Requirement, candidate: Candidate, folder: Path) -> 
             proven = all(one.met(end) for one in bounds for end in (lower, upper)) if bounds else None
             found[metric] = Proof(expected, value, lower, upper, point.n_seed, asked, proven)
     return found
+
+
+def _without_files(
+    requirement: Requirement, candidate: Candidate, chosen: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """Return those keys of the chosen scenario that name files beside the requirement, for a scenario elsewhere.
+
+    A recorded motion is copied to the folder; a measured mirror and the file of a belief are written out.
+    """
+    scenario, mirror = requirement.scenario, requirement.mirrors[candidate.mirror]
+    pointing, fusion = dict(chosen["pointing"]), {key: dict(entry) for key, entry in chosen["fusion"].items()}
+    if "response" in pointing["mirror"]:
+        others = {key: value for key, value in pointing["mirror"].items() if key != "response"}
+        measured = {key: dump(mirror)[key] for key in ("numerator", "denominator")}
+        pointing["mirror"] = {**others, **measured}
+    belief = fusion[candidate.blend].get("belief")
+    if isinstance(belief, str) and is_belief_file(belief):
+        spec = scenario.fusion[candidate.blend]
+        beliefs = resolved_fusion({candidate.blend: spec})[candidate.blend]["belief"]
+        fusion[candidate.blend]["belief"] = {name: beliefs[name] for name in candidate.sensors}
+    kept = scenario.kept_in(folder).motion
+    motion = [
+        {kind: dump(term, folder)} if "file" in type(term).model_fields else written
+        for written, (kind, term) in zip(chosen["motion"], kept, strict=True)
+    ]
+    return {"pointing": pointing, "fusion": fusion, "motion": motion}
 
 
 def _write(path: Path, head: str, content: dict[str, Any]) -> Path:

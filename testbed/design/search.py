@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from testbed.design.response import filter_response
-from testbed.design.spectra import disturbance, error_power, errors_of, reading_noise
+from testbed.design.spectra import deflection_power, disturbance, doubts_of, error_power, errors_of, reading_noise
 from testbed.errors import Problem, ScenarioError
 from testbed.pointing.parameters import PointingParameters
 from testbed.scenario.pointing import gains_of
@@ -37,6 +37,8 @@ class Candidate:
         What it leaves, by the metrics that are asked for, and `residual_rms_urad` [urad].
     met : bool
         Whether that is enough.
+    doubts : tuple of str
+        What the spectra do not know of it and should: where its mirror comes to an end.
     """
 
     sensors: tuple[str, ...]
@@ -46,6 +48,7 @@ class Candidate:
     cost: float
     values: Mapping[str, float]
     met: bool
+    doubts: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -124,12 +127,14 @@ def search(requirement: Requirement) -> Design:
             aimed = replace(part, pointing=pointing)
             gains = gains_of(aimed, blend)
             heard = {name: noise[name] for name in part.sensors}
-            power = error_power(shake, response, heard, pointing.mirror, gains, pointing.tracker.noise)
+            way = response, heard, pointing.mirror, gains, pointing.tracker.noise
+            power, deflection = error_power(shake, *way), deflection_power(shake, *way)
             values = {metric: errors_of(power, shake, metric) for metric in metrics}
             met = all(bound.met(values[bound.metric]) for bound in requirement.bounds)
             chain = (*(("sensors", name) for name in part.sensors), ("fusion", blend), ("trackers", tracker))
             cost = sum(requirement.costs[key] for key in (*chain, ("mirrors", mirror)))
-            found.append(Candidate(tuple(part.sensors), blend, tracker, mirror, cost, values, met))
+            doubts = doubts_of(deflection, shake, pointing.mirror)
+            found.append(Candidate(tuple(part.sensors), blend, tracker, mirror, cost, values, met, doubts))
     if not found:
         reasons = [Problem(f"{name}: {reason}", file=whole.file) for name, reason in refused.items()]
         raise ScenarioError(reasons)

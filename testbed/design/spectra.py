@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from testbed.pointing.parameters import Mirror
     from testbed.scenario.model import Scenario
     from testbed.sensors.base import Sensor
-    from testbed.signals import FloatArray
+    from testbed.signals import ComplexArray, FloatArray
 
 _URAD = 1e6
 
@@ -107,20 +107,109 @@ def error_power(
     tracker_noise : float
         r [rad/sqrt(Hz)].
     """
-    freq = shake.freq_hz
+    s, left = _left(shake.freq_hz, response, mirror, gains)
+    power: FloatArray = np.abs(left / s) ** 2 * shake.power + _drawn(
+        shake, response, noise, mirror, gains, tracker_noise
+    )
+    return power
+
+
+def deflection_power(
+    shake: Disturbance,
+    response: FilterResponse,
+    noise: Mapping[str, FloatArray],
+    mirror: Mirror,
+    gains: Gains,
+    tracker_noise: float,
+) -> FloatArray:
+    """Return the share of the mean square of the mirror's deflection, the true angle without the residual, at each
+    frequency of the disturbance [rad^2], shape (n_freq,): of a mirror without ends.
+
+    Parameters
+    ----------
+    shake : Disturbance
+        The true rate.
+    response : FilterResponse
+        Of the filter.
+    noise : mapping of str to ndarray, shape (n_freq,)
+        Two-sided density of the readings of each sensor [rad^2/s].
+    mirror : Mirror
+        The way of the command.
+    gains : Gains
+        Of the tracker.
+    tracker_noise : float
+        r [rad/sqrt(Hz)].
+    """
+    s, left = _left(shake.freq_hz, response, mirror, gains)
+    power: FloatArray = np.abs((1.0 - left) / s) ** 2 * shake.power + _drawn(
+        shake, response, noise, mirror, gains, tracker_noise
+    )
+    return power
+
+
+def _passed(freq: FloatArray, mirror: Mirror) -> ComplexArray:
+    """Return the deflection over the estimated angle."""
     s = 2j * np.pi * freq
-    passed = mirror.dynamics.response(freq) * np.exp(-s * mirror.latency) * (1.0 + sum(mirror.lead_times) * s)
+    passed: ComplexArray = (
+        mirror.dynamics.response(freq) * np.exp(-s * mirror.latency) * (1.0 + sum(mirror.lead_times) * s)
+    )
     if mirror.rate is not None:
         passed = passed * np.sinc(freq / mirror.rate) * np.exp(-0.5 * s / mirror.rate)
-    S = gains.sensitivity(freq)
+    return passed
+
+
+def _left(
+    freq: FloatArray, response: FilterResponse, mirror: Mirror, gains: Gains
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return s [rad/s], and the residual over the true angle."""
     T = 1.0 + response.at(response.error, freq)
-    signal = np.abs(S * (1.0 - passed * T) / s) ** 2 * shake.power
+    left: ComplexArray = gains.sensitivity(freq) * (1.0 - _passed(freq, mirror) * T)
+    s = np.asarray(2j * np.pi * freq, dtype=np.complex128)
+    return s, left
+
+
+def _drawn(
+    shake: Disturbance,
+    response: FilterResponse,
+    noise: Mapping[str, FloatArray],
+    mirror: Mirror,
+    gains: Gains,
+    tracker_noise: float,
+) -> FloatArray:
+    """Return the share of noise of sensors and tracker in the mean square, of residual and deflection alike [rad^2]."""
+    freq = shake.freq_hz
+    S = gains.sensitivity(freq)
     density = np.sum(
         [np.abs(response.at(response.noise[name], freq)) ** 2 * one for name, one in noise.items()], axis=0
     )
-    drawn = np.abs(S * passed / s) ** 2 * density + np.abs(1.0 - S) ** 2 * tracker_noise**2
-    power: FloatArray = signal + 2.0 * shake.step_hz * drawn
-    return power
+    through = np.abs(S * _passed(freq, mirror) / (2j * np.pi * freq)) ** 2
+    drawn: FloatArray = 2.0 * shake.step_hz * (through * density + np.abs(1.0 - S) ** 2 * tracker_noise**2)
+    return drawn
+
+
+def doubts_of(deflection: FloatArray, shake: Disturbance, mirror: Mirror) -> tuple[str, ...]:
+    """Return where three times the rms of the deflection or of its rate does not stay within the mirror's ends.
+
+    Parameters
+    ----------
+    deflection : ndarray, shape (n_freq,)
+        As `deflection_power` has it [rad^2].
+    shake : Disturbance
+        Of that frequencies.
+    mirror : Mirror
+        With its ends.
+    """
+    speed = deflection * (2.0 * np.pi * shake.freq_hz) ** 2
+    ends = (("deflection", deflection, mirror.stroke, "urad", _URAD), ("rate", speed, mirror.rate_limit, "rad/s", 1.0))
+    found = []
+    for what, power, end, unit, scale in ends:
+        reach = 3.0 * weighted_rms(power)
+        if end is not None and reach > end:
+            found.append(
+                f"3 sigma of the mirror's {what} is {scale * reach:.3g} {unit}, beyond its end at {scale * end:.3g} "
+                f"{unit}, which spectra do not know: judge it by --prove"
+            )
+    return tuple(found)
 
 
 def errors_of(power: FloatArray, shake: Disturbance, metric: str) -> float:

@@ -68,4 +68,14 @@ def _text(value: Any) -> str | None:
         return None
     if isinstance(value, bool):
         return "on" if value else "off"
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return _listed(value) if isinstance(value, list) else str(value)
+
+
+def _listed(entries: list[Any]) -> str:
+    """Return a list in words: its values, or what each of its mappings says, such as `kind lost, at 5 s`."""
+    if not any(isinstance(entry, dict) for entry in entries):
+        return ", ".join(map(str, entries))
+    return "; ".join(
+        ", ".join(f"{key} {_text(value)}" for key, value in entry.items()) if isinstance(entry, dict) else str(entry)
+        for entry in entries
+    )

@@ -271,3 +271,17 @@ def test_one_point_has_a_command(tmp_path):
     study = standard_study(Contenders({"kalman": {}}), short=True)
     assert study.command == "testbed regress --short"
     assert published(["m:A"], ["m.py"]).words == ["--plugin=m.py", "--filter=m:A"]
+
+
+@pytest.mark.parametrize("word", ["x", "9:1", "0", "0:-1", f"0:{2**63}", "0:1:2"])
+def test_a_word_that_is_no_case_is_refused_before_any_is_built(monkeypatch, word):
+    monkeypatch.setattr(standard, "_scenario", None)
+    refused = CliRunner().invoke(app, ["regress", "--short", "--only", word])
+    assert isinstance(refused.exception, ScenarioError)
+    assert "expected CASE:SEED, the case from 0 to 8, such as 8:1" in str(refused.exception)
+
+
+def test_one_case_is_built_alone_and_is_that_of_the_whole(tiny):
+    (one,) = standard_study(Contenders({"kalman": {}}), short=True, only=0).cases
+    (whole,) = standard_study(Contenders({"kalman": {}}), short=True).cases
+    assert one.sha256 == whole.sha256

@@ -138,3 +138,9 @@ def test_a_base_that_is_not_there_is_named(tmp_path):
     (tmp_path / "base.yaml").unlink()
     with pytest.raises(ScenarioError, match=r"base\.yaml: cannot be read"):
         load_study(path)
+
+
+def test_a_list_of_nothing_is_refused_in_our_words(tmp_path):
+    path = written(tmp_path, "vary: {duration: {list: []}}\n")
+    with pytest.raises(ScenarioError, match=r"vary\.duration\.list: expected at least 1 entry, got 0: add some"):
+        load_study(path)

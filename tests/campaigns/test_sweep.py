@@ -14,6 +14,7 @@ import testbed
 from testbed.campaigns.agenda import CHUNK, Agenda, play
 from testbed.campaigns.engine import play_here
 from testbed.campaigns.rows import FAILED, rows_of, schema_of
+from testbed.campaigns.size import warm
 from testbed.campaigns.store import CASES, CaseStore, read_cases
 from testbed.campaigns.study import load_study
 from testbed.campaigns.sweep import open_sweep, sweep
@@ -278,3 +279,28 @@ def test_a_sensors_clock_sweeps(tmp_path):
         metrics = testbed.run(case.scenario, seed=study.seeds[0]).metrics
         assert rows[case.number, "kalman"]["rmse_deg_s"] == pytest.approx(metrics.fusion["kalman"].rmse_deg_s, rel=1e-9)
     assert rows[0, "kalman"]["rmse_deg_s"] != rows[1, "kalman"]["rmse_deg_s"]
+
+
+def test_workers_of_this_machine_find_the_cache_warm_and_those_elsewhere_are_left_alone(done, tmp_path, monkeypatch):
+    study, _ = done
+    warmed = []
+
+    def no_client(*_):
+        msg = "enough"
+        raise RunError(msg)
+
+    monkeypatch.setattr("testbed.campaigns.size.warm", warmed.append)
+    monkeypatch.setattr("testbed.campaigns.engine._client", no_client)
+    for words, expected in (({"workers": 2}, [study]), ({"scheduler": "tcp://127.0.0.1:1"}, [study])):
+        with pytest.raises(RunError, match="enough"):
+            sweep(study, out=tmp_path / "out", **words)
+        assert warmed == expected
+
+
+def test_a_case_that_fails_at_its_beginning_does_not_stop_the_warming(done, monkeypatch):
+    def fails(*_):
+        msg = "no"
+        raise RunError(msg)
+
+    monkeypatch.setattr("testbed.campaigns.size.Lockstep", fails)
+    warm(done[0])

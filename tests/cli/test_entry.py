@@ -191,3 +191,13 @@ def test_an_interrupt_in_a_run_still_ends_with_130_after_the_libraries(tmp_path)
         assert process.returncode == 130, error
         assert "Traceback" not in error
         assert not list(tmp_path.glob("runs/*"))
+
+
+def test_an_interrupted_campaign_says_that_its_runs_are_kept(tmp_path):
+    fault = (
+        "from testbed.cli.interruption import keeping_runs\n"
+        "def fail():\n    with keeping_runs():\n        raise KeyboardInterrupt"
+    )
+    result = broken(fault, tmp_path)
+    assert_clear(result, 130)
+    assert "every run that was finished is kept: the same command again goes on from there" in result.stderr

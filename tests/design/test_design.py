@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from typer.testing import CliRunner
 
 import testbed
 from testbed.cli.app import app
+from testbed.design.proof import write_chosen
 from testbed.design.requirement import read_requirement
 from testbed.design.response import filter_response
-from testbed.design.search import chosen_scenario, search
+from testbed.design.search import Candidate, chosen_scenario, search
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "satellite_link_design.yaml"
 SHORT = """\
@@ -170,3 +172,32 @@ def test_the_example_chooses_what_its_page_says():
     assert design.chosen.sensors == ("mhd_ars",)
     assert (design.chosen.mirror, design.chosen.cost) == ("led", 48.0)
     assert_allclose(design.chosen.values["rpe_urad.0.1"], 0.155, atol=0.002)
+
+
+def test_a_mirror_whose_end_is_near_is_told_with_numbers(found):
+    asked, _ = found
+    ended = {"plain": asked.mirrors["plain"].model_copy(update={"stroke": 1e-6, "rate_limit": 1e-4})}
+    for one in search(replace(asked, mirrors=ended)).candidates:
+        stroke, rate = one.doubts
+        # The line of 20 urad alone has an rms of 14.1, the mirror follows it.
+        assert float(stroke.split()[7]) > 3 * 14.0
+        assert "beyond its end at 1 urad" in stroke
+        assert "rad/s" in rate
+    free = search(replace(asked, mirrors={"plain": asked.mirrors["plain"]}))
+    assert {one.doubts for one in free.candidates} == {()}
+
+
+def test_the_chosen_scenario_needs_no_file_beside_the_requirement(tmp_path):
+    t = np.arange(0.0, 7.0, 0.001)
+    rows = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, 0.1 * np.sin(200 * t), strict=True))
+    (tmp_path / "shake.csv").write_text("t,w\n" + rows)
+    recorded = "recorded: {file: shake.csv, time: {column: t, unit: s}, rate: {column: w, unit: deg/s}}"
+    text = SHORT.replace("sine: {frequency: 30 Hz, angle: 20 urad}", recorded)
+    path = tmp_path / "quick.yaml"
+    path.write_text(text)
+    asked = read_requirement(path)
+    one = Candidate(("mhd_ars",), "kalman", "coarse", "plain", 1.0, {}, met=True)
+    (tmp_path / "out").mkdir()
+    again = testbed.load_scenario(write_chosen(asked, one, tmp_path / "out"))
+    at = np.arange(100) / 1000.0
+    assert_allclose(again.profile().rate(at), asked.scenario.profile().rate(at), rtol=1e-12)

@@ -11,6 +11,7 @@ import xarray as xr
 
 import testbed
 from testbed.fusion import FILTERS
+from testbed.runs.attributes import unit_of
 from tests.scenes import short
 
 # All of what is written, as UDUNITS has it; cf_units.Unit, once asked, knows each.
@@ -63,3 +64,10 @@ def test_a_lost_reading_plots_as_a_gap(stored):
         (line,) = tree["sensors/mems_gyro/rate"].plot(ax=plt.figure().subplots())
     assert np.array_equal(np.isnan(line.get_ydata()), lost)
     plt.close("all")
+
+
+@pytest.mark.parametrize("sensor", ["slow_rate", "slow_drift", "rate", "drift"])
+@pytest.mark.parametrize(("diagnostic", "unit"), [("R", "rad^2/s^2"), ("band", "1"), ("frequency", "Hz")])
+def test_a_diagnostic_keeps_its_unit_whatever_its_sensor_is_called(sensor, diagnostic, unit):
+    assert unit_of("fusion/kalman", f"{diagnostic}_{sensor}") == unit
+    assert unit_of("truth", f"{sensor}_rate") == "rad/s"

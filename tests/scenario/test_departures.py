@@ -45,3 +45,10 @@ def test_what_differs_is_named_with_both_values_as_written(tmp_path):
 def test_what_a_change_sets_is_a_departure_too(tmp_path):
     scenario = short(tmp_path).with_(**{"sensors.mems_gyro.angle_random_walk": "0.6 deg/sqrt(h)"})
     assert by_part(scenario)["sensors.mems_gyro"]["differs"][0]["here"] == "0.6 deg/sqrt(h)"
+
+
+def test_faults_are_told_in_words(tmp_path):
+    faults = "faults: [{kind: lost, at: 0.2 s, length: 0.1 s}]"
+    edited = short(tmp_path, ("preset: adis16505_filtered", f"preset: adis16505_filtered, {faults}"))
+    rows = {row["key"]: row["here"] for part in departures(edited) for row in part["differs"]}
+    assert rows["faults"] == "kind lost, at 0.2 s, length 0.1 s"

@@ -21,6 +21,7 @@ from testbed.errors import Problem, ScenarioError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from testbed.campaigns.study import Study
     from testbed.campaigns.sweep import Progress
 
 
@@ -47,6 +48,7 @@ def run_regression(
     update: str | None = None,
     workers: int = 1,
     out: str | Path | None = None,
+    begin: Callable[[Study], None] | None = None,
     progress: Callable[[Progress], None] | None = None,
     history: Path = HISTORY,
 ) -> Outcome:
@@ -66,6 +68,8 @@ def run_regression(
         Processes.
     out : str or Path, optional
         Folder; ``runs/regress_standard`` or ``runs/regress_short``, with the names of an entry, if not given.
+    begin : callable, optional
+        Gets what will be played, before any of it is.
     progress : callable, optional
         As for `testbed.sweep`.
     history : Path, optional
@@ -87,6 +91,8 @@ def run_regression(
     study = replace(standard_study(entry or shipped(), short=short), code=code_sha256(plugins))
     target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
     make_way(target, study, plugins)
+    if begin is not None:
+        begin(study)
     folder = sweep(study, workers=workers, out=target, progress=progress)
     table = read_cases(folder).to_pylist()
     rows, failures = essence(table), [row for row in table if row["status"] != OK]

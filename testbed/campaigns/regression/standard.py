@@ -151,7 +151,22 @@ def published(filters: Iterable[str], plugins: Sequence[str]) -> Contenders:
     return Contenders({one.rsplit(":", maxsplit=1)[-1]: {"type": one} for one in filters}, plugins)
 
 
-def standard_study(entry: Contenders, *, short: bool = False) -> Study:
+def case_count(*, short: bool = False) -> int:
+    """Return how many cases the standard campaign has.
+
+    Parameters
+    ----------
+    short : bool, optional
+        Its short form.
+    """
+    return len(_settings_of(short=short))
+
+
+def _settings_of(*, short: bool) -> list[Setting]:
+    return _short_settings() if short else _settings()
+
+
+def standard_study(entry: Contenders, *, short: bool = False, only: int | None = None) -> Study:
     """Return the standard campaign of some filters.
 
     Parameters
@@ -160,6 +175,8 @@ def standard_study(entry: Contenders, *, short: bool = False) -> Study:
         Which.
     short : bool, optional
         Its short form.
+    only : int, optional
+        The one case that is wanted of it, by its number: building all takes seconds.
 
     Raises
     ------
@@ -167,8 +184,11 @@ def standard_study(entry: Contenders, *, short: bool = False) -> Study:
         If a filter refuses a case.
     """
     name = SHORT if short else STANDARD
-    settings = _short_settings() if short else _settings()
-    cases = tuple(Variation(i, one.values, _scenario(one, entry, short=short)) for i, one in enumerate(settings))
+    cases = tuple(
+        Variation(i, one.values, _scenario(one, entry, short=short))
+        for i, one in enumerate(_settings_of(short=short))
+        if only in (None, i)
+    )
     text = "every filter on the same signals, starts, faults, calibration errors and instruments"
     words = ["testbed", "regress", *(["--short"] if short else []), *entry.words]
     seeds = tuple(range(1, _SEEDS[name] + 1))

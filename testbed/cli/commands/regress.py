@@ -37,22 +37,21 @@ def regress(
 ) -> None:
     """Play the standard campaign, compare it with the stored baseline, and write the leaderboard."""
     from testbed.campaigns.regression.regress import run_regression
-    from testbed.campaigns.regression.standard import published, shipped, standard_study
+    from testbed.campaigns.regression.standard import case_count, published, shipped, standard_study
 
     entry = published(filters, plugin or ()) if filters else None
     if only is not None:
-        from testbed.cli.repeat import repeat
+        from testbed.cli.repeat import repeat, which
 
-        repeat(standard_study(entry or shipped(), short=short), only, out, output)
+        number, seed = which(only, case_count(short=short), 1)
+        study = standard_study(entry or shipped(), short=short, only=number)
+        repeat(study.name, study.cases[0], seed, out, output)
         return
-    options: dict[str, Any] = {"short": short, "update": update, "workers": workers, "out": out}
-    if output.quiet:
-        found = run_regression(entry, **options)
-    else:
-        from testbed.cli.progress import sweeping
+    from testbed.cli.campaign import playing, tell_size
 
-        with sweeping("regress") as told:
-            found = run_regression(entry, **options, progress=told)
+    options: dict[str, Any] = {"short": short, "update": update, "workers": workers, "out": out}
+    with playing("regress", output) as told:
+        found = run_regression(entry, **options, **told, begin=lambda study: tell_size(study, workers, output))
     document = _document(found)
     output.show(document, lambda: _print(found))
     if found.failures:

@@ -32,22 +32,20 @@ def sweep(
 ) -> None:
     """Play every case of a study under its seeds: cases.parquet and sweep.html."""
     from testbed.campaigns.study import load_study
-    from testbed.cli.repeat import repeat
 
     loaded = load_study(study, plugins=plugin or ())
     if only is not None:
-        repeat(loaded, only, out, output)
-        return
-    from testbed.campaigns.size import size_of, sweep_words
-    from testbed.campaigns.sweep import sweep as play
-    from testbed.cli.progress import sweeping
+        from testbed.cli.repeat import repeat, which
 
-    output.note(f"{loaded.name}: {sweep_words(size_of(loaded, workers))}")
-    if output.quiet:
-        folder, told = play(loaded, workers=workers, scheduler=scheduler, out=out), None
-    else:
-        with sweeping(loaded.name) as told:
-            folder = play(loaded, workers=workers, scheduler=scheduler, out=out, progress=told)
+        number, seed = which(only, len(loaded.cases), loaded.seeds[0])
+        repeat(loaded.name, loaded.cases[number], seed, out, output)
+        return
+    from testbed.campaigns.sweep import sweep as play
+    from testbed.cli.campaign import playing, tell_size
+
+    tell_size(loaded, workers, output)
+    with playing(loaded.name, output) as told:
+        folder = play(loaded, workers=workers, scheduler=scheduler, out=out, **told)
     document = _document(folder, loaded)
     output.show(document, lambda: _print(document))
     if document["failures"]:
