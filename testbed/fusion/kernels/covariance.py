@@ -120,6 +120,17 @@ def reach_step(F, Q, j, s, tables, at, n, rows):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
+def alike(node, share, whole, begin):  # pragma: no cover
+    """Return the first step after `begin` that is not of its length: in between F and Q stay what they are, and the
+    compiler knows it.
+    """
+    stop = begin + 1
+    while stop < node.size and whole[stop] == 0 and node[stop] == node[begin] and share[stop] == share[begin]:
+        stop += 1
+    return stop
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
 def spans(A, first, stop, reach):  # pragma: no cover
     """Set reach[i] = the columns from `first` to before `stop` between which row i of A is not zero."""
     for i in range(A.shape[0]):
@@ -535,59 +546,64 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         spans(F, core, n, reach)
         spans(H, 0, core, seen[:, :2])
         spans(H, core, n, seen[:, 2:])
-        for k in range(Z.shape[1]):
-            if started:
-                if node.size > 0:
-                    if whole[k] > 0:
-                        reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
-                        coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[k])
-                    reach_step(F, Q, node[k], share[k], tables, at, n, rows)
-                if form == SQUARE_ROOT:
-                    predict_root(x, P, F, Q, array, moved, n)
-                    recall_root(x, P, G, gain, lost, due, n)
-                elif form == JOSEPH:
-                    predict(x, P, F, Q, reach, work, moved, n, core)
-                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
-                else:
-                    predict_plain(x, P, F, Q, work, moved, n)
-            read = False
-            for i in range(n_sensor):
-                row = HEADER_ROWS + INNOVATION_ROWS * i
-                out[row + INNOVATION, k] = np.nan
-                out[row + INNOVATION_VARIANCE, k] = np.nan
-                due[i] = np.isfinite(Z[i, k])
-                e[i] = kind.type(0.0)
-                if due[i]:
+        begin = 0
+        while begin < Z.shape[1]:
+            stop = Z.shape[1]
+            if node.size > 0:
+                stop = alike(node, share, whole, begin)
+                if started and whole[begin] > 0:
+                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
+                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+            for k in range(begin, stop):
+                if started:
                     if form == SQUARE_ROOT:
-                        e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
+                        predict_root(x, P, F, Q, array, moved, n)
+                        recall_root(x, P, G, gain, lost, due, n)
+                    elif form == JOSEPH:
+                        predict(x, P, F, Q, reach, work, moved, n, core)
+                        recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
                     else:
-                        e[i], spread = innovation(x, P, H, seen, i, kind.type(Z[i, k]), g, n, core)
-                    outside[i] = outside_gate(outside[i], e[i], spread + R[i])
-                    if 0 < outside[i] <= PATIENCE:
-                        due[i], e[i] = False, kind.type(0.0)
-                        continue
-                    read = True
-                    out[row + INNOVATION, k] = e[i]
-                    out[row + INNOVATION_VARIANCE, k] = spread + R[i]
-            if read:
-                started = True
-            if form == SQUARE_ROOT:
-                if read:
-                    gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
-                # Sent out first: in hardware the covariance has until the next reading.
-                out[RATE, k] = x[0]
-                if read:
-                    update_root(P, G, gain, R, due, n, n_sensor)
-                out[STD, k] = np.sqrt(row_square(P, 0, n))
-            else:
+                        predict_plain(x, P, F, Q, work, moved, n)
+                read = False
                 for i in range(n_sensor):
+                    row = HEADER_ROWS + INNOVATION_ROWS * i
+                    out[row + INNOVATION, k] = np.nan
+                    out[row + INNOVATION_VARIANCE, k] = np.nan
+                    due[i] = np.isfinite(Z[i, k])
+                    e[i] = kind.type(0.0)
                     if due[i]:
-                        if form == JOSEPH:
-                            update(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
+                        if form == SQUARE_ROOT:
+                            e[i], spread = innovation_root(x, P, H, i, kind.type(Z[i, k]), n)
                         else:
-                            update_plain(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
-                out[RATE, k] = x[0]
-                out[STD, k] = np.sqrt(P[0, 0])
+                            e[i], spread = innovation(x, P, H, seen, i, kind.type(Z[i, k]), g, n, core)
+                        outside[i] = outside_gate(outside[i], e[i], spread + R[i])
+                        if 0 < outside[i] <= PATIENCE:
+                            due[i], e[i] = False, kind.type(0.0)
+                            continue
+                        read = True
+                        out[row + INNOVATION, k] = e[i]
+                        out[row + INNOVATION_VARIANCE, k] = spread + R[i]
+                if read:
+                    started = True
+                if form == SQUARE_ROOT:
+                    if read:
+                        gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                    # Sent out first: in hardware the covariance has until the next reading.
+                    out[RATE, k] = x[0]
+                    if read:
+                        update_root(P, G, gain, R, due, n, n_sensor)
+                    out[STD, k] = np.sqrt(row_square(P, 0, n))
+                else:
+                    for i in range(n_sensor):
+                        if due[i]:
+                            if form == JOSEPH:
+                                update(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
+                            else:
+                                update_plain(x, P, H, seen, i, kind.type(Z[i, k]), R[i], g, K, n, core)
+                    out[RATE, k] = x[0]
+                    out[STD, k] = np.sqrt(P[0, 0])
+            begin = stop
         x_in[:], P_in[:] = x, P
         return started
 
@@ -896,82 +912,87 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         spans(H, 0, core, seen[:, :2])
         spans(H, core, n, seen[:, 2:])
         adapts_Q = chosen.any()
-        for k in range(Z.shape[1]):
-            predicted = progress[0] > 0.0
-            if predicted:
-                if node.size > 0:
-                    if whole[k] > 0:
-                        reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
-                        coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[k])
-                    reach_step(F, Q, node[k], share[k], tables, at, n, rows)
-                if form == SQUARE_ROOT:
-                    predict_root(x, P, F, Q, array, moved, n)
-                    recall_root(x, P, G, gain, lost, due, n)
-                elif form == JOSEPH:
-                    predict(x, P, F, Q, reach, work, moved, n, core)
-                    recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
-                else:
-                    predict_plain(x, P, F, Q, work, moved, n)
-            read = False
-            for i in range(n_sensor):
-                row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
-                for m in range(ADAPTIVE_ROWS):
-                    out[row + m, k] = np.nan
-                due[i] = np.isfinite(Z[i, k])
-                e[i], R[i] = kind.type(0.0), kind.type(1.0)
-                if not due[i]:
-                    continue
-                z = kind.type(Z[i, k] - sensors[i].offset)
-                if form == SQUARE_ROOT:
-                    e[i], spread[i] = innovation_root(x, P, H, i, z, n)
-                else:
-                    e[i], spread[i] = innovation(x, P, H, seen, i, z, g, n, core)
-                sensors[i].outside = outside_gate(sensors[i].outside, e[i], spread[i] + sensors[i].R)
-                if 0 < sensors[i].outside <= PATIENCE:
-                    due[i], e[i] = False, kind.type(0.0)
-                    continue
-                read = True
-                square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
-            if adapts_Q:
-                for j in range(n):
-                    x_prior[j] = x[j]
-                    P_prior[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
-            if form == SQUARE_ROOT and read:
-                gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
-                # Sent out first: in hardware the covariance has until the next reading.
-                out[RATE, k] = x[0]
-                update_root(P, G, gain, R, due, n, n_sensor)
-            hits = 0
-            for i in range(n_sensor):
-                if due[i]:
-                    z = kind.type(Z[i, k] - sensors[i].offset)
-                    if form == JOSEPH:
-                        update(x, P, H, seen, i, z, R[i], g, K, n, core)
-                    elif form == CONVENTIONAL:
-                        update_plain(x, P, H, seen, i, z, R[i], g, K, n, core)
-                    learn(sensors[i], e[i], square[i], spread[i])
-                elif not np.isnan(Z[i, k]):
-                    sensors[i].previous_innovation = np.nan
-                    sensors[i].previous_reading = np.nan
-                hits += sensors[i].hits
-            if read and predicted and adapts_Q:
-                progress[1] *= forget
-                d = (1.0 - forget) / (1.0 - progress[1])
-                for j in range(n):
-                    P_post[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
-                    # Q is diagonal here, and so is its root.
+        begin = 0
+        while begin < Z.shape[1]:
+            stop = Z.shape[1]
+            if node.size > 0:
+                stop = alike(node, share, whole, begin)
+                if progress[0] > 0.0 and whole[begin] > 0:
+                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
+                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+            for k in range(begin, stop):
+                predicted = progress[0] > 0.0
+                if predicted:
                     if form == SQUARE_ROOT:
-                        Q[j, j] = Q[j, j] * Q[j, j]
-                progress[2] += adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n)
-                if form == SQUARE_ROOT:
+                        predict_root(x, P, F, Q, array, moved, n)
+                        recall_root(x, P, G, gain, lost, due, n)
+                    elif form == JOSEPH:
+                        predict(x, P, F, Q, reach, work, moved, n, core)
+                        recall(x, P, 0, kind.type(LOST_VARIANCE), kind.type(0.0), g, n)
+                    else:
+                        predict_plain(x, P, F, Q, work, moved, n)
+                read = False
+                for i in range(n_sensor):
+                    row = ADAPTIVE_HEADER_ROWS + ADAPTIVE_ROWS * i
+                    for m in range(ADAPTIVE_ROWS):
+                        out[row + m, k] = np.nan
+                    due[i] = np.isfinite(Z[i, k])
+                    e[i], R[i] = kind.type(0.0), kind.type(1.0)
+                    if not due[i]:
+                        continue
+                    z = kind.type(Z[i, k] - sensors[i].offset)
+                    if form == SQUARE_ROOT:
+                        e[i], spread[i] = innovation_root(x, P, H, i, z, n)
+                    else:
+                        e[i], spread[i] = innovation(x, P, H, seen, i, z, g, n, core)
+                    sensors[i].outside = outside_gate(sensors[i].outside, e[i], spread[i] + sensors[i].R)
+                    if 0 < sensors[i].outside <= PATIENCE:
+                        due[i], e[i] = False, kind.type(0.0)
+                        continue
+                    read = True
+                    square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
+                if adapts_Q:
                     for j in range(n):
-                        Q[j, j] = np.sqrt(Q[j, j])
-            if read:
-                progress[0] = 1.0
-            out[RATE, k] = x[0]
-            out[STD, k] = np.sqrt(row_square(P, 0, n) if form == SQUARE_ROOT else P[0, 0])
-            out[Q_RATE, k] = row_square(Q, 0, n) if form == SQUARE_ROOT else Q[0, 0]
-            out[GUARD_HITS, k] = hits + progress[2]
+                        x_prior[j] = x[j]
+                        P_prior[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+                if form == SQUARE_ROOT and read:
+                    gain_root(x, P, H, e, R, due, G, C, gain, n, n_sensor)
+                    # Sent out first: in hardware the covariance has until the next reading.
+                    out[RATE, k] = x[0]
+                    update_root(P, G, gain, R, due, n, n_sensor)
+                hits = 0
+                for i in range(n_sensor):
+                    if due[i]:
+                        z = kind.type(Z[i, k] - sensors[i].offset)
+                        if form == JOSEPH:
+                            update(x, P, H, seen, i, z, R[i], g, K, n, core)
+                        elif form == CONVENTIONAL:
+                            update_plain(x, P, H, seen, i, z, R[i], g, K, n, core)
+                        learn(sensors[i], e[i], square[i], spread[i])
+                    elif not np.isnan(Z[i, k]):
+                        sensors[i].previous_innovation = np.nan
+                        sensors[i].previous_reading = np.nan
+                    hits += sensors[i].hits
+                if read and predicted and adapts_Q:
+                    progress[1] *= forget
+                    d = (1.0 - forget) / (1.0 - progress[1])
+                    for j in range(n):
+                        P_post[j] = row_square(P, j, n) if form == SQUARE_ROOT else P[j, j]
+                        # Q is diagonal here, and so is its root.
+                        if form == SQUARE_ROOT:
+                            Q[j, j] = Q[j, j] * Q[j, j]
+                    progress[2] += adapt_Q(Q, chosen, x, x_prior, P_post, P_prior, d, n)
+                    if form == SQUARE_ROOT:
+                        for j in range(n):
+                            Q[j, j] = np.sqrt(Q[j, j])
+                if read:
+                    progress[0] = 1.0
+                out[RATE, k] = x[0]
+                out[STD, k] = np.sqrt(row_square(P, 0, n) if form == SQUARE_ROOT else P[0, 0])
+                out[Q_RATE, k] = row_square(Q, 0, n) if form == SQUARE_ROOT else Q[0, 0]
+                out[GUARD_HITS, k] = hits + progress[2]
+            begin = stop
         x_in[:], P_in[:] = x, P
         if adapts_Q:
             Q_in[:] = Q
