@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from testbed.campaigns.axes import Axis, jointly_drawn, values_of
 from testbed.document import Document
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, shortened
 from testbed.parts import Part
 from testbed.scenario.loader import load_scenario
 from testbed.scenario.model import Seed
@@ -239,5 +239,5 @@ def _find(document: Document, number: int, values: Mapping[str, Any], problem: P
     """Note at the axis that brings it what is wrong with a case."""
     at = [key for key in values if problem.key == key or problem.key.startswith(f"{key}.") or key in problem.key]
     key: tuple[str, ...] = ("vary", at[0]) if at else ("vary",)
-    written = ", ".join(f"{name} {value}" for name, value in values.items())
+    written = ", ".join(shortened(f"{name} {value}") for name, value in values.items())
     document.find(key, f"case {number} ({written}): {problem.key}: {problem.message}")

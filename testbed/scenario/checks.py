@@ -118,6 +118,8 @@ def _check_plant(scenario: Scenario, document: Document) -> None:
             Turntable(still, {}, scenario.base_rate_hz, modal=True).process(excerpt(scenario).process(1))
         except ScenarioError as error:
             document.find(("turntable", "engine"), _reasons(error))
+        except RunError as error:
+            document.find(("turntable",), f"{error}: the first step asks for more than the motor has")
 
 
 def _reasons(error: ScenarioError) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from testbed.errors import ScenarioError, UnknownNameError, quoted
+from testbed.errors import ScenarioError, UnknownNameError, quoted, shortened
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.belief_file import is_belief_file, read_belief
@@ -144,7 +144,7 @@ class Fusion:
         for name, kind in self.types.items():
             one = known.get(name, known.get(kind))
             if one is None:
-                words = f"says nothing of sensor {name!r} (it knows {', '.join(sorted(known))})"
+                words = f"says nothing of sensor {quoted(name)} (it knows {shortened(', '.join(sorted(known)))})"
                 self._find(key, f"{words}; {_REMEDY if self.simulated else _OF_RECORDING}")
             else:
                 belief[name] = one

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+import testbed
+from testbed.campaigns.study import load_study
 from testbed.cli.app import app
 from testbed.errors import MOST_QUOTED, ScenarioError
 from testbed.fusion.filters.self_calibrating import SelfCalibratingParameters
@@ -71,3 +73,51 @@ def test_a_response_that_no_model_can_be_fitted_to_is_refused_and_named(tmp_path
         # Outside of the tests NumPy goes on where a number overflows.
         with np.errstate(all="ignore"), pytest.raises(ScenarioError, match="gyro"):
             identify_sensors(read_log(tmp_path / "log.csv"), "laser", "gyro")
+
+
+def test_sensors_that_a_belief_knows_are_not_echoed_whole():
+    sensors = {"mems_gyro": {"preset": "adis16505_filtered"}, "mhd_ars": {"preset": "sx300"}}
+    sensor = {"numerator": [1.0], "denominator": [1.0], "output_noise": "1e-6 rad/s/sqrt(Hz)"}
+    belief = {"mems_gyro": sensor, "s" * 300: sensor}
+    with pytest.raises(ScenarioError) as refused:
+        testbed.Scenario.from_dict(
+            {
+                "name": "long",
+                "duration": "1 s",
+                "motion": [{"static": {}}],
+                "sensors": sensors,
+                "fusion": {"kalman": {"belief": belief}},
+            }
+        )
+    assert "says nothing of sensor" in str(refused.value)
+    assert "s" * (MOST_QUOTED + 1) not in str(refused.value)
+
+
+def test_a_value_of_an_axis_is_not_echoed_whole(tmp_path):
+    (tmp_path / "base.yaml").write_text(BASE)
+    (tmp_path / "study.yaml").write_text(
+        f"name: long\nbase: base.yaml\nvary: {{sensors.mems_gyro.bias_instability: [{{preset: {'s' * 300}}}]}}\n"
+    )
+    with pytest.raises(ScenarioError) as refused:
+        load_study(tmp_path / "study.yaml")
+    assert "case 0" in str(refused.value)
+    assert "s" * (MOST_QUOTED + 1) not in str(refused.value)
+
+
+def test_a_first_step_beyond_the_motor_is_a_finding_for_modes_too():
+    wheel = {
+        "speed": "1800 rev/min",
+        "stop_speed": "3000 rev/min",
+        "inertia": "1 kg*m^2",
+        "harmonics": [{"number": 1.0, "coefficient": "13.7 g*cm^2"}],
+        "modes": [{"frequency": "41 Hz", "damping": 0.01, "gain": 1e9}],
+    }
+    with pytest.raises(ScenarioError, match="more than the motor has"):
+        testbed.Scenario.from_dict(
+            {
+                "name": "hard",
+                "duration": "1 s",
+                "turntable": {"preset": "air_bearing", "engine": "modal"},
+                "motion": [{"reaction_wheel": wheel}],
+            }
+        )
