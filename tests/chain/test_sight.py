@@ -50,6 +50,27 @@ def test_another_pointing_is_played_on_the_same_run(folder, tmp_path):
     assert "latency dominates" in table.stdout
 
 
+def test_a_replayed_record_has_the_line_of_sight_of_its_run(tmp_path):
+    """With the same readings, truth, filter and start."""
+    filters, run = {"kalman": {"belief": "eq39"}}, tmp_path / "run"
+    testbed.run(aimed(duration="1 s", settle="0.5 s", fusion=filters), out=run, outputs=["netcdf"])
+    log = testbed.export(run, "parquet", tmp_path / "log") / "log.yaml"
+    testbed.replay(log, filters, start="rest", settle=0.5, out=tmp_path / "again", outputs=["netcdf"])
+    other = {"tracker": {"bandwidth": "5 Hz"}, "windows": ["10 ms"]}
+    own, found = (testbed.line_of_sight(place, other)["kalman"] for place in (run, tmp_path / "again"))
+    assert_allclose(found.residual_rms_urad, own.residual_rms_urad, rtol=1e-6)
+    assert_allclose(found.rpe_urad["0.01"], own.rpe_urad["0.01"], rtol=1e-6)
+    told = CliRunner().invoke(app, ["pointing", str(tmp_path / "again"), "--pointing", _file(tmp_path), "--json"])
+    assert told.exit_code == 0, told.output
+    assert json.loads(told.stdout)["pointing"]["kalman"]["residual_rms_urad"] > 0.0
+
+
+def _file(folder):
+    path = folder / "aim.yaml"
+    path.write_text(OTHER)
+    return str(path)
+
+
 @pytest.mark.parametrize(
     ("text", "key"),
     [
