@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import time
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import replace
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
