@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from testbed.design.response import filter_response
-from testbed.design.spectra import deflection_power, disturbance, doubts_of, error_power, errors_of, reading_noise
+from testbed.design.spectra import disturbance, doubts_of, errors_of, mean_squares, reading_noise
 from testbed.errors import Problem, ScenarioError
 from testbed.pointing.parameters import PointingParameters
 from testbed.scenario.pointing import gains_of
@@ -128,7 +128,7 @@ def search(requirement: Requirement) -> Design:
             gains = gains_of(aimed, blend)
             heard = {name: noise[name] for name in part.sensors}
             way = response, heard, pointing.mirror, gains, pointing.tracker.noise
-            power, deflection = error_power(shake, *way), deflection_power(shake, *way)
+            power, deflection = mean_squares(shake, *way)
             values = {metric: errors_of(power, shake, metric) for metric in metrics}
             met = all(bound.met(values[bound.metric]) for bound in requirement.bounds)
             chain = (*(("sensors", name) for name in part.sensors), ("fusion", blend), ("trackers", tracker))

@@ -82,15 +82,16 @@ def reading_noise(sensors: Mapping[str, Sensor], freq_hz: FloatArray) -> dict[st
     return found
 
 
-def error_power(
+def mean_squares(
     shake: Disturbance,
     response: FilterResponse,
     noise: Mapping[str, FloatArray],
     mirror: Mirror,
     gains: Gains,
     tracker_noise: float,
-) -> FloatArray:
-    """Return the share of the residual's mean square at each frequency of the disturbance [rad^2], shape (n_freq,).
+) -> tuple[FloatArray, FloatArray]:
+    """Return the shares of the mean squares of the residual and of the mirror's deflection, the true angle without the
+    residual, at each frequency of the disturbance [rad^2], each of shape (n_freq,): of a mirror without ends.
 
     Parameters
     ----------
@@ -108,43 +109,10 @@ def error_power(
         r [rad/sqrt(Hz)].
     """
     s, left = _left(shake.freq_hz, response, mirror, gains)
-    power: FloatArray = np.abs(left / s) ** 2 * shake.power + _drawn(
-        shake, response, noise, mirror, gains, tracker_noise
-    )
-    return power
-
-
-def deflection_power(
-    shake: Disturbance,
-    response: FilterResponse,
-    noise: Mapping[str, FloatArray],
-    mirror: Mirror,
-    gains: Gains,
-    tracker_noise: float,
-) -> FloatArray:
-    """Return the share of the mean square of the mirror's deflection, the true angle without the residual, at each
-    frequency of the disturbance [rad^2], shape (n_freq,): of a mirror without ends.
-
-    Parameters
-    ----------
-    shake : Disturbance
-        The true rate.
-    response : FilterResponse
-        Of the filter.
-    noise : mapping of str to ndarray, shape (n_freq,)
-        Two-sided density of the readings of each sensor [rad^2/s].
-    mirror : Mirror
-        The way of the command.
-    gains : Gains
-        Of the tracker.
-    tracker_noise : float
-        r [rad/sqrt(Hz)].
-    """
-    s, left = _left(shake.freq_hz, response, mirror, gains)
-    power: FloatArray = np.abs((1.0 - left) / s) ** 2 * shake.power + _drawn(
-        shake, response, noise, mirror, gains, tracker_noise
-    )
-    return power
+    drawn = _drawn(shake, response, noise, mirror, gains, tracker_noise)
+    error: FloatArray = np.abs(left / s) ** 2 * shake.power + drawn
+    deflection: FloatArray = np.abs((1.0 - left) / s) ** 2 * shake.power + drawn
+    return error, deflection
 
 
 def _passed(freq: FloatArray, mirror: Mirror) -> ComplexArray:
@@ -193,7 +161,7 @@ def doubts_of(deflection: FloatArray, shake: Disturbance, mirror: Mirror) -> tup
     Parameters
     ----------
     deflection : ndarray, shape (n_freq,)
-        As `deflection_power` has it [rad^2].
+        As `mean_squares` has it [rad^2].
     shake : Disturbance
         Of that frequencies.
     mirror : Mirror
@@ -218,7 +186,7 @@ def errors_of(power: FloatArray, shake: Disturbance, metric: str) -> float:
     Parameters
     ----------
     power : ndarray, shape (n_freq,)
-        As `error_power` has it [rad^2].
+        As `mean_squares` has it [rad^2].
     shake : Disturbance
         Of that frequencies.
     metric : str
