@@ -175,14 +175,14 @@ class Sheet:
     def beside(self, error: ValidationError) -> ValidationError:
         """Return the problems together with what else is wrong, less what only follows from either."""
         others = [
-            _line(one["type"], one["loc"], one["msg"], one["input"])
+            _line(one["type"], one["loc"], one["msg"], one["input"], one.get("ctx", {}))
             for one in error.errors()
             if one["loc"] not in self._unread and one["type"] != _CONSEQUENCE
         ]
         return ValidationError.from_exception_data(error.title, [*self._lines(), *others])
 
     def _lines(self) -> list[InitErrorDetails]:
-        return [_line("quantity", (key,), message, None) for key, message in self.problems.items()]
+        return [_line("quantity", (key,), message, None, {}) for key, message in self.problems.items()]
 
     def _said_twice(self, key: str, others: tuple[str, ...]) -> bool:
         twice = [other for other in others if other in self.values]
@@ -199,8 +199,10 @@ class Sheet:
             return None
 
 
-def _line(kind: str, place: tuple[str | int, ...], message: str, value: Any) -> InitErrorDetails:
-    error = PydanticCustomError(kind, "{reason}", {"reason": message})
+def _line(
+    kind: str, place: tuple[str | int, ...], message: str, value: Any, context: dict[str, Any]
+) -> InitErrorDetails:
+    error = PydanticCustomError(kind, "{reason}", {**context, "reason": message})
     return InitErrorDetails(type=error, loc=place, input=value)
 
 

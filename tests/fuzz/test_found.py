@@ -121,3 +121,17 @@ def test_a_first_step_beyond_the_motor_is_a_finding_for_modes_too():
                 "motion": [{"reaction_wheel": wheel}],
             }
         )
+
+
+@pytest.mark.parametrize("position", [["0 m"] * 4, ["0 m"] * 150, ["0 m"] * 2, [], ["0 m", "0 m", "0 m", {"x": 1}]])
+def test_a_list_of_the_wrong_length_beside_a_data_sheet_is_one_finding(position):
+    """A gyro joins the findings of its data sheet with those of its fields, which keep what they count."""
+    with pytest.raises(ScenarioError, match=r"mounting\.position.*(at most 3 entries|is required)"):
+        testbed.Scenario.from_dict(
+            {
+                "name": "long",
+                "duration": "1 s",
+                "motion": [{"static": {}}],
+                "sensors": {"mems_gyro": {"preset": "adis16505_filtered", "mounting": {"position": position}}},
+            }
+        )
