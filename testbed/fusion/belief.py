@@ -15,7 +15,7 @@ from testbed.errors import UnknownNameError
 from testbed.fusion.realisation import Realisation, realise
 from testbed.parts import Part
 from testbed.signals import transfer
-from testbed.units import Duration, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
+from testbed.units import DelayTime, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -74,7 +74,7 @@ class SensorBelief(Part):
 
     numerator: Coefficients
     denominator: Coefficients
-    delay: Duration = 0.0
+    delay: DelayTime = 0.0
     bias: Rate = 0.0
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0
