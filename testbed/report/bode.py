@@ -8,10 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
-from testbed.pages.numbers import plain
+from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, frequency_axis, label, marked
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
@@ -123,13 +121,10 @@ def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
     phase.set_yticks(range(-180, 181, 90))
     phase.set_ylim(-190, 190)
     coherence.set_ylim(-0.04, 1.06)
-    coherence.set_xlabel("frequency [Hz]")
     for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=True):
         axes.set_ylabel(words)
         axes.grid(visible=True)
-    coherence.xaxis.set_major_locator(LogLocator(numticks=20))
-    coherence.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-    coherence.xaxis.set_minor_formatter(NullFormatter())
+    frequency_axis(coherence)
 
 
 def _handles(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> list[Line2D | Patch]:
