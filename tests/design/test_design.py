@@ -141,7 +141,9 @@ def test_everything_wrong_is_found_at_once(tmp_path):
     """The parts of the requirement, the scenario in it, and an entry that is no mapping, each at its line."""
     path = tmp_path / "bad.yaml"
     text = SHORT.replace("duration: 6 s", "duration: 6").replace("cost: 30", "cost: x").replace("10 Hz", "10 m")
-    path.write_text(text.replace("wideband: {belief: identified}", "wideband: 5").replace("mirrors:", "mirrors: []\nx:"))
+    path.write_text(
+        text.replace("wideband: {belief: identified}", "wideband: 5").replace("mirrors:", "mirrors: []\nx:")
+    )
     with pytest.raises(testbed.ScenarioError) as caught:
         read_requirement(path)
     keys = ["duration", "sensors.mhd_ars.cost", "fusion.wideband", "trackers.coarse.bandwidth", "mirrors", "x"]

@@ -105,7 +105,9 @@ class Recorded(Motion):
         if not copy.exists():
             copy.write_bytes(content)
         elif copy.stat().st_size != len(content) or copy.read_bytes() != content:
-            raise refusal(copy, f"a copy of {self.file.name} would replace this file: move it away, or take another folder")
+            raise refusal(
+                copy, f"a copy of {self.file.name} would replace this file: move it away, or take another folder"
+            )
         return self.model_copy(update={"file": copy, "sha256": hashlib.sha256(content).hexdigest()})
 
     @model_validator(mode="after")
