@@ -328,6 +328,8 @@ class Quantity:
 Angle = Annotated[float, Quantity("rad", "5 mrad")]
 AngularAcceleration = Annotated[float, Quantity("rad/s^2", "0.1 deg/h/s")]
 Duration = Annotated[float, Quantity("s", "20 s", at_least=0.0)]
+# A delay is a line of samples; a second of it is more than any instrument has.
+DelayTime = Annotated[float, Quantity("s", "200 us", at_least=0.0, at_most=1.0)]
 PositiveDuration = Annotated[float, Quantity("s", "20 s", above=0.0)]
 Frequency = Annotated[float, Quantity("Hz", "10 Hz", above=0.0)]
 # Some minutes between two readings, up to the base clock.

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from testbed.fusion.realisation import Realisation, realise
 from testbed.parts import Part, read_shipped
 from testbed.signals import transfer
-from testbed.units import Duration, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
+from testbed.units import DelayTime, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -72,7 +72,7 @@ class SensorBelief(Part):
 
     numerator: Coefficients
     denominator: Coefficients
-    delay: Duration = 0.0
+    delay: DelayTime = 0.0
     bias: Rate = 0.0
     input_noise: RateDensity = 0.0
     output_noise: RateDensity = 0.0

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, SerializationInfo, ValidationInfo, field_serializer, field_validator
 
+from testbed.errors import quoted
 from testbed.fusion.base import BlockFilter, CommonParameters, Switch
 from testbed.fusion.kernels.covariance import CONVENTIONAL, JOSEPH, SQUARE_ROOT
 from testbed.fusion.model import FusionModel, build_model, covariance_root
@@ -239,7 +240,7 @@ class ModelFilter(BlockFilter):
         for name, value in zip(self.model.sensors, R, strict=True):
             if not value > 0.0:
                 msg = (
-                    f"{key}: expected more than 0 for {name!r}, got {value}; "
+                    f"{key}: expected more than 0 for {quoted(name)}, got {value}; "
                     "give it here or give the belief an output_noise"
                 )
                 raise ValueError(msg)

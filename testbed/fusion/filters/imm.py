@@ -13,7 +13,7 @@ from testbed.fusion.filters.kalman import KalmanParameters
 from testbed.fusion.kernels.literature import imm_kernel
 from testbed.fusion.model_filter import FilterParameters, initial_state
 from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
-from testbed.units import DEG, PositiveDuration
+from testbed.units import DEG, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
-Share = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+# Beyond that the chance to leave within a step is none in double precision, and a model once out never returns.
+Sojourn = Annotated[float, Quantity("s", "1 s", above=0.0, at_most=1e6)]
+Share = Annotated[float, Field(ge=1e-12, le=1e12)]
 
 
 class ImmParameters(FilterParameters):
@@ -39,7 +41,7 @@ class ImmParameters(FilterParameters):
     default_q: ClassVar[dict[int, float]] = KalmanParameters.default_q
 
     ratios: Annotated[tuple[Share, ...], Field(min_length=1, max_length=8)] = (0.01, 1.0, 100.0)
-    sojourn: PositiveDuration = 1.0
+    sojourn: Sojourn = 1.0
 
 
 class Imm(BlockFilter):
