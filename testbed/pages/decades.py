@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axis import YAxis
 from matplotlib.lines import Line2D
-from matplotlib.markers import TICKDOWN, TICKLEFT
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from testbed.pages.numbers import decade, plain, significant
@@ -43,13 +43,12 @@ class Multiples(Artist):
     def __init__(self, axis: Axis) -> None:
         super().__init__()
         self._axis, axes = axis, axis.axes
-        upright = axis.axis_name == "y"
-        place = axes.get_yaxis_transform("tick1") if upright else axes.get_xaxis_transform("tick1")
-        tick = f"{axis.axis_name}tick"
-        size, width, color = (mpl.rcParams[f"{tick}.{key}"] for key in ("minor.size", "minor.width", "color"))
+        upright = isinstance(axis, YAxis)
+        # Both axes have the same ticks in every style of ours.
+        size, width, color = (mpl.rcParams[key] for key in ("xtick.minor.size", "xtick.minor.width", "xtick.color"))
         self._line = Line2D([], [], linestyle="none", markersize=size, markeredgewidth=width, color=color)
-        self._line.set_marker(TICKLEFT if upright else TICKDOWN)
-        self._line.set_transform(place)
+        self._line.set_marker(0 if upright else 3)  # to the left, down
+        self._line.set_transform(axes.get_yaxis_transform("tick1") if upright else axes.get_xaxis_transform("tick1"))
         self._line.set_figure(axes.figure)
         axes.add_artist(self)
         self.set_in_layout(False)
@@ -67,7 +66,7 @@ class Multiples(Artist):
         """Draw them."""
         along = self.places()
         across = np.zeros(along.size)
-        self._line.set_data(*((along, across) if self._axis.axis_name == "x" else (across, along)))
+        self._line.set_data(*((across, along) if isinstance(self._axis, YAxis) else (along, across)))
         self._line.draw(renderer)
 
 
@@ -90,7 +89,7 @@ def label_powers(axis: Axis, words: Callable[[float], str] = decade, *, most: in
     axis.set_minor_formatter(NullFormatter())
     if most is not None:
         axis.set_major_locator(LogLocator(numticks=most))
-    upright, axes = axis.axis_name == "y", axis.axes
+    upright, axes = isinstance(axis, YAxis), axis.axes
     for each in (axes.get_shared_y_axes() if upright else axes.get_shared_x_axes()).get_siblings(axes):
         Multiples(each.yaxis if upright else each.xaxis)
 
