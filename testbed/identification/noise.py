@@ -81,9 +81,9 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
     pairs = [(one, other) for one, other in zip(*both, strict=True) if max(one.chance, other.chance) < limit]
     told = np.array([_told(*pair) for pair in pairs]).reshape(-1, 2, 3)
     freq_hz, freedom = np.array([(one.noise_hz, one.freedom) for one, _ in pairs], dtype=float).reshape(-1, 2).T
-    floors = [NoiseFloor(freq_hz, level / grid.length, freedom) for level in told[:, 0].T]
-    of_reference, of_first, of_second = (float(one) / np.sqrt(max(len(pairs), 1)) for one in told[:, 1].sum(axis=0))
-    return ThreeFloors(*floors, (of_reference, of_first, of_second))
+    own, of_first, of_second = (NoiseFloor(freq_hz, level / grid.length, freedom) for level in told[:, 0].T)
+    sure = told[:, 1].sum(axis=0) / np.sqrt(max(len(pairs), 1))
+    return ThreeFloors(own, of_first, of_second, (float(sure[0]), float(sure[1]), float(sure[2])))
 
 
 def _told(first: LocalFit, second: LocalFit) -> tuple[FloatArray, FloatArray]:
