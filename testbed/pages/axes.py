@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-from testbed.pages.numbers import decade, plain
+from testbed.pages.numbers import plain
 from testbed.pages.svg import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -125,51 +124,6 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
 def label(group: str) -> str:
     """Return the instance's name; a dollar sign would start a formula."""
     return group.split("/", 1)[-1].replace("$", r"\$")
-
-
-def decade_axis(axes: Axes) -> None:
-    """Label the powers of ten of a logarithmic y axis whose limits stand, and 2 and 5 times them where fewer than two
-    are seen.
-
-    Parameters
-    ----------
-    axes : Axes
-        Whose y axis it is.
-    """
-    low, high = np.log10(axes.get_ylim())
-    label_decades(axes.yaxis)
-    if np.floor(high) - np.ceil(low) < 1.0:
-        axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        axes.yaxis.set_minor_formatter(axes.yaxis.get_major_formatter())
-
-
-def label_decades(axis: Axis) -> None:
-    """Label the powers of ten of a logarithmic axis, each of them and all in one way of writing.
-
-    Not by matplotlib's own formatter: its typesetting of powers takes a quarter of the time of the whole report.
-
-    Parameters
-    ----------
-    axis : Axis
-        Either of an axes.
-    """
-    axis.set_major_locator(LogLocator(numticks=20))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: decade(value, axis.get_view_interval())))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def frequency_axis(axes: Axes) -> None:
-    """Name a logarithmic x axis of frequencies and label its powers of ten in digits.
-
-    Parameters
-    ----------
-    axes : Axes
-        Whose x axis it is.
-    """
-    axes.set_xlabel("frequency [Hz]")
-    axes.xaxis.set_major_locator(LogLocator(numticks=20))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def time_axis(axes: Axes, span_s: float, *, named: bool = True) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, frequency_axis, label, marked
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
@@ -121,6 +122,7 @@ def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
     phase.set_yticks(range(-180, 181, 90))
     phase.set_ylim(-190, 190)
     coherence.set_ylim(-0.04, 1.06)
+    coherence.set_xlabel("frequency [Hz]")
     for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=True):
         axes.set_ylabel(words)
         axes.grid(visible=True)

@@ -10,7 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, frequency_axis, label, marked
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -74,6 +75,7 @@ def budget_figure(budget: Budget, colors: Mapping[str, str], unit: Unit = DEG_S)
                 textcoords="offset points", ha="center", fontsize=8,
             )  # fmt: skip
         axes.set_xlim(low, 1.1 * high)
+        axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel(f"noise, input-referred, two-sided [{unit[0]}/√Hz]")
         frequency_axis(axes)
         decade_axis(axes)

@@ -9,18 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import (
-    DEGREE,
-    WIDTH_IN,
-    arrange,
-    decade_axis,
-    draw,
-    frequency_axis,
-    label,
-    marked,
-    on_area,
-    time_axis,
-)
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
@@ -132,6 +122,7 @@ def spectra_beside(
                 axes.plot(floor.frequency_hz, density, color=_FLOOR, linewidth=1.1, linestyle=style)
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel(f"error root density, two-sided [{unit[0]}/√Hz]")
         frequency_axis(axes)
         decade_axis(axes)

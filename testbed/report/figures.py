@@ -10,19 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from testbed.pages.axes import (
-    DEGREE,
-    HOURS_FROM,
-    WIDTH_IN,
-    arrange,
-    decade_axis,
-    draw,
-    frequency_axis,
-    label,
-    marked,
-    on_area,
-    time_axis,
-)
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -290,6 +279,7 @@ def by_group(digest: Digest) -> dict[str, ErrorTrace]:
 
 
 def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
+    axes.set_xlabel("frequency [Hz]")
     of = "error" if digest.has_truth else "rate"
     axes.set_ylabel(f"{of} root density, two-sided [{unit[0]}/√Hz]")
     frequency_axis(axes)

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, frequency_axis, label, marked, on_area
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked, on_area
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -170,6 +171,7 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
         handles.append(Line2D([], [], color=INK, linewidth=1.3, linestyle=_DOTTED, label="knowledge"))
         above.set_ylabel("density, two-sided [µrad/√Hz]")
         below.set_ylabel("rms below the frequency [µrad]")
+        below.set_xlabel("frequency [Hz]")
         frequency_axis(below)
         for axes, decades in ((above, 6.0), (below, 3.5)):
             _last_decades(axes, decades)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from testbed.pages.axes import label_decades
+from testbed.pages.decades import label_powers
 from testbed.pages.numbers import plain
 from testbed.pages.svg import INK, STYLE
 from testbed.runs.atomic import write_bytes
@@ -60,7 +60,7 @@ def logarithmic(axes: Axes, which: str) -> None:
     for name, axis, scale in (("x", axes.xaxis, axes.set_xscale), ("y", axes.yaxis, axes.set_yscale)):
         if name in which:
             scale("log")
-            label_decades(axis)
+            label_powers(axis, most=9)
 
 
 def in_time(axes: Axes, t: FloatArray) -> None:
