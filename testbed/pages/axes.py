@@ -84,7 +84,11 @@ def on_area(mark: Mark, color: str, n_points: int | None = None) -> dict[str, An
 
     Parameters
     ----------
-    mark, color, n_points
+    mark : Mark
+        Of the name.
+    color : str
+        Of the area.
+    n_points : int, optional
         As of `marked`.
     """
     return marked(mark, color, n_points) | {"linestyle": "-", "markeredgecolor": INK}

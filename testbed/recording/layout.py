@@ -9,7 +9,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from testbed.recording.channel import HEIGHT, WIDTH
-from testbed.recording.plots import BESIDE, LEGEND, at_cursor, errors_beside, plot
+from testbed.recording.plots import BESIDE, LEGEND, at_cursor, errors_in_row, plot
 from testbed.recording.stream import TIMELINE
 from testbed.recording.target import ENTITY as TARGET
 from testbed.recording.target import HALF
@@ -116,9 +116,9 @@ def blueprint(
     errors = {entity: entities[entity] for entity in entities if re.fullmatch(r"/fusion/[^/]+/error", entity)}
     if errors:
         views = [
-            errors_beside(f"Error = estimate − truth, {span}", "Error of {}", errors, zoom, unit),
-            errors_beside(f"Error from {window[0]:g} s on", "{}, settled", errors, (window[0], duration), unit),
-            errors_beside("Error, whole run", "{}, whole run", dict.fromkeys(errors), (0.0, duration), unit),
+            errors_in_row(f"Error = estimate − truth, {span}", "Error of {}", errors, zoom, unit),
+            errors_in_row(f"Error from {window[0]:g} s on", "{}, settled", errors, (window[0], duration), unit),
+            errors_in_row("Error, whole run", "{}, whole run", dict.fromkeys(errors), (0.0, duration), unit),
         ]
         right.append(("Errors", views[::-1] if live else views, 3 if len(errors) <= BESIDE else 8))
     if sights := [entity for entity in entities if entity.startswith("/pointing/")]:

@@ -97,7 +97,7 @@ def _series(
     )
 
 
-def errors_beside(
+def errors_in_row(
     title: str, words: str, errors: Mapping[str, Extremes], span: tuple[float, float], unit: RateUnit
 ) -> rrb.Container:
     """Return the errors beside each other, for they would hide each other in one plot; in one scale but for those that
