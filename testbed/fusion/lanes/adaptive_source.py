@@ -16,7 +16,7 @@ from testbed.fusion.lanes.source import (
     load,
     matrices_of,
     memory_names,
-    move,
+    moved_states,
     over_lanes,
     state_names,
 )
@@ -42,7 +42,7 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
     text = HEAD % "F, Q, H, W, windows, common, seen, due, Z, rate, std, innovation, variance"
     lines = [*matrices_of(pattern), *(f"    q{i}_{j} = Q[{i}, {j}]" for i in range(n) for j in range(i + 1))]
     lines += ["    n_window = windows.shape[1]", *(line for i in range(n_sensor) for line in _bands(i))]
-    moved = [*load(rows, state_names(n)), *move(pattern), *(f"{rows.at(f'x{i}')} = x{i}" for i in range(n))]
+    moved = [*load(rows, state_names(n)), *moved_states(pattern), *(f"{rows.at(f'x{i}')} = x{i}" for i in range(n))]
     lines += ["    for k in range(due.shape[1]):", *over_lanes(8, [*moved, *_grow(pattern, rows)])]
     for i in range(n_sensor):
         lines += [f"        if due[{i}, k]:", *_observe(pattern, rows, i)]

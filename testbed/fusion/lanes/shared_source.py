@@ -14,7 +14,7 @@ from testbed.fusion.lanes.source import (
     less_seen,
     load,
     matrices_of,
-    move,
+    moved_states,
     over_lanes,
     state_names,
 )
@@ -58,7 +58,7 @@ def _given(pattern: Pattern, i: int) -> list[str]:
 def _step(pattern: Pattern, rows: Workspace, together: Sequence[int]) -> list[str]:
     """Return a step of one lane: all innovations, then one reading after the other."""
     states = state_names(pattern.n)
-    lines = [*load(rows, states), *move(pattern), f"beyond = {rows.at('beyond')}"]
+    lines = [*load(rows, states), *moved_states(pattern), f"beyond = {rows.at('beyond')}"]
     for i in together:
         lines += [f"z{i} = Z[{i}, k, s]", f"e{i} = z{i}{less_seen(pattern, i)}", f"innovation[{i}, k, s] = e{i}"]
         lines += [f"beyond = max(beyond, e{i} * e{i} - limit{i})"]

@@ -285,7 +285,7 @@ def less_seen(pattern: Pattern, i: int) -> str:
     return "".join(f" - h{i}_{j} * x{j}" for j in pattern.H[i])
 
 
-def move(pattern: Pattern) -> list[str]:
+def moved_states(pattern: Pattern) -> list[str]:
     """Return x = F x, of plain variables.
 
     Parameters
