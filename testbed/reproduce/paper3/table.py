@@ -76,7 +76,7 @@ def seeds_csv(found: Found) -> str:
 
 def shown_rows(found: Found) -> list[dict[str, Any]]:
     """Return the rows of the page; the paper's methods that are not ours last; arguments as `medians_csv`."""
-    shown = []
+    shown: list[dict[str, Any]] = []
     for (name, trained_on), runs in found.items():
         leaks, refused = _verdicts(runs)
         known = {"method": name, "trained_on": trained_on, "leaks": leaks, "refused": refused}
@@ -112,8 +112,8 @@ def printed(found: Found, seeds: int) -> Iterator[str]:
         yield f"least and largest of the {seeds} seeds, which the median of all seeds lies between with {certain:.0%}"
         yield _line(("method", "trained on"), _HEADS.values(), 20)
         for key, runs in found.items():
-            at = dict(zip(COLUMNS, _spans(runs), strict=True))
-            yield _line(key, (at[name] for name in _HEADS), 20)
+            spans = dict(zip(COLUMNS, _spans(runs), strict=True))
+            yield _line(key, (spans[name] for name in _HEADS), 20)
 
 
 def _line(names: tuple[str, str], cells: Iterable[str], width: int) -> str:
