@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from testbed.errors import quoted
 from testbed.parts import Part
 
 Ends = Annotated[tuple[str | int | float, str | int | float], Field()]
@@ -85,7 +86,7 @@ def values_of(axis: Axis) -> list[Any]:
     if axis.linear is not None:
         return [_written(x, unit, ends) for x in np.linspace(low, high, axis.points)]
     if not (low > 0.0 and high > 0.0):
-        msg = f"expected ends above zero on a logarithmic axis, got {ends[0]} and {ends[1]}"
+        msg = f"expected ends above zero on a logarithmic axis, got {quoted(ends[0])} and {quoted(ends[1])}"
         raise ValueError(msg)
     return [_written(x, unit, ends) for x in np.geomspace(low, high, axis.points)]
 
@@ -110,7 +111,7 @@ def jointly_drawn(axes: dict[str, Axis], seed: int) -> list[dict[str, Any]]:
     counts = {key: axis.points for key, axis in axes.items()}
     n = next(iter(counts.values()))
     if len(set(counts.values())) != 1 or n is None:
-        msg = f"expected the same points on all drawn axes, since they are drawn together, got {counts}"
+        msg = f"expected the same points on all drawn axes, since they are drawn together, got {quoted(counts)}"
         raise ValueError(msg)
     columns = {key: _drawn(key, axis, n, seed) for key, axis in axes.items()}
     return [{key: column[k] for key, column in columns.items()} for k in range(n)]
@@ -134,12 +135,12 @@ def _span(ends: tuple[Any, Any]) -> tuple[float, float, str]:
     for end in ends:
         match = _NUMBER.fullmatch(str(end))
         if isinstance(end, bool) or match is None or not math.isfinite(float(match[1])):
-            msg = f"expected two numbers with their unit, such as ['0.5 Hz', '500 Hz'], got {end!r}"
+            msg = f"expected two numbers with their unit, such as ['0.5 Hz', '500 Hz'], got {quoted(end)}"
             raise ValueError(msg)
         found.append((float(match[1]), match[2].strip()))
     (low, unit), (high, other) = found
     if unit != other:
-        msg = f"expected both ends in the same unit, got {ends[0]!r} and {ends[1]!r}"
+        msg = f"expected both ends in the same unit, got {quoted(ends[0])} and {quoted(ends[1])}"
         raise ValueError(msg)
     return low, high, unit
 

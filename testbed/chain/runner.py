@@ -11,6 +11,7 @@ from testbed.chain.interrupt import held_interrupts
 from testbed.chain.pipeline import simulate
 from testbed.chain.sinks import open_sinks
 from testbed.chain.versions import versions
+from testbed.errors import quoted
 from testbed.judging.judge import Judge
 from testbed.notebook import Run, open_run
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
@@ -79,7 +80,7 @@ def run(
     <Run still, 0.1 s, seed 3>
     """
     if block is not None and not 0.0 < block < math.inf:
-        msg = f"block: expected more than 0 s, and finite, got {block!r}"
+        msg = f"block: expected more than 0 s, and finite, got {quoted(block)}"
         raise ValueError(msg)
     loaded = as_scenario(scenario)
     loaded = loaded if seed is None else loaded.with_seed(seed)

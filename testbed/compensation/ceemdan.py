@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from testbed.compensation.emd import check_count, checked_signal, first_mode, while_modes_are_left
+from testbed.errors import quoted
 from testbed.signals import random_stream
 
 if TYPE_CHECKING:
@@ -132,5 +133,5 @@ def _check(variant: str, noise: float, **counts: int) -> None:
         msg = f"noise: expected a finite ratio of at least 0, got {noise}"
         raise ValueError(msg)
     if variant not in get_args(Variant):
-        msg = f"variant: expected one of {', '.join(get_args(Variant))}, got {variant!r}"
+        msg = f"variant: expected one of {', '.join(get_args(Variant))}, got {quoted(variant)}"
         raise ValueError(msg)

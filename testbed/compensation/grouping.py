@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from testbed.compensation.entropy import multiscale_permutation_entropy, multiscale_sample_entropy
+from testbed.errors import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -130,5 +131,5 @@ def _entropy_of(method: str) -> Callable[[FloatArray, list[int]], FloatArray]:
         return multiscale_sample_entropy
     if method == "permutation_entropy":
         return multiscale_permutation_entropy
-    msg = f"method: expected period, sample_entropy or permutation_entropy, got {method!r}"
+    msg = f"method: expected period, sample_entropy or permutation_entropy, got {quoted(method)}"
     raise ValueError(msg)

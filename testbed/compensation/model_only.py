@@ -17,6 +17,7 @@ from testbed.compensation.features import Features, Scaling
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.polynomial import Polynomial
 from testbed.compensation.record import checked
+from testbed.errors import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -249,7 +250,7 @@ def train(
         If the method is unknown or the records are too few or too short.
     """
     if method not in METHODS:
-        msg = f"method: expected one of {', '.join(METHODS)}, got {method!r}"
+        msg = f"method: expected one of {', '.join(METHODS)}, got {quoted(method)}"
         raise ValueError(msg)
     kind, fit, own = METHODS[method]
     chosen = own if features is None else features

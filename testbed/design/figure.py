@@ -8,7 +8,8 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis
+from testbed.pages.axes import WIDTH_IN, arrange
+from testbed.pages.decades import decade_axis
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:

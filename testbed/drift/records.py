@@ -12,7 +12,7 @@ import numpy as np
 
 from testbed.compensation.record import GyroRecord
 from testbed.drift.columns import OPTIONS, Columns
-from testbed.errors import UnknownNameError
+from testbed.errors import UnknownNameError, quoted
 from testbed.logs.choice import channel_map, time_map
 from testbed.logs.formats import open_table
 from testbed.logs.names import quantity_of
@@ -201,7 +201,7 @@ def _planned(table: Table, name: str, column: str, unit: str | None, usual: str,
     if quantity_of(chosen) != name:
         quantity = "K" if name == "temperature" else "rad/s"
         raise refusal(
-            table.path, f"expected a quantity in {quantity}, such as '1 {usual}', got {chosen!r}", keys("unit")
+            table.path, f"expected a quantity in {quantity}, such as '1 {usual}', got {quoted(chosen)}", keys("unit")
         )
     return plan(name, channel_map(column=column, unit=chosen, time=time), table, keys)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
+from testbed.errors import quoted
 from testbed.fusion.belief import check_belief
 from testbed.fusion.gate import Gate
 from testbed.fusion.kernels.covariance import HEADER_ROWS, RATE, STD
@@ -187,7 +188,7 @@ class BlockFilter:
         if not self.any_clock and (odd := odd_sensor(sample_rate_hz)):
             fastest, value = max(sample_rate_hz.values()), sample_rate_hz[odd]
             msg = (
-                f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {odd!r} for "
+                f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {quoted(odd)} for "
                 f"{type(self).__name__}, got {value:g} Hz; `kalman` takes any"
             )
             raise ValueError(msg)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.errors import quoted
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -35,7 +37,7 @@ def nearest_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int
     """
     for name, value in sample_rate_hz.items():
         if not (math.isfinite(value) and value > 0.0):
-            msg = f"sample_rate_hz: expected more than 0 Hz for {name!r}, got {value!r}"
+            msg = f"sample_rate_hz: expected more than 0 Hz for {quoted(name)}, got {quoted(value)}"
             raise ValueError(msg)
     fastest = float(max(sample_rate_hz.values()))
     return fastest, tuple(round(fastest / value) for value in sample_rate_hz.values())
@@ -85,7 +87,7 @@ def common_clock(sample_rate_hz: Mapping[str, float]) -> tuple[float, tuple[int,
     fastest, strides = nearest_clock(sample_rate_hz)
     if name := odd_sensor(sample_rate_hz):
         value = sample_rate_hz[name]
-        msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {name!r}, got {value:g} Hz"
+        msg = f"sample_rate_hz: expected {fastest:g} Hz to be an integer multiple of {quoted(name)}, got {value:g} Hz"
         raise ValueError(msg)
     return fastest, strides
 
@@ -160,7 +162,7 @@ class Schedule:
             due = row[-self._sample % stride :: stride]
             if values.shape != due.shape:
                 msg = (
-                    f"readings: expected {due.size} of {name!r} (every {stride}th of the {n_time} samples from "
+                    f"readings: expected {due.size} of {quoted(name)} (every {stride}th of the {n_time} samples from "
                     f"{self._sample} on), got shape {values.shape}"
                 )
                 raise ValueError(msg)

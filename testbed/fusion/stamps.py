@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.fusion.kernels.merging import merge_stamps
 from testbed.fusion.schedule import nearest_clock, odd_sensor
 
@@ -84,7 +85,7 @@ class Stamps:
         due = np.ceil(end * self._rates - 1e-9 * self._rates).astype(np.int64)
         for name, have, wanted, before in zip(self.sensors, stop, due, self._counted, strict=True):
             if have != wanted:
-                msg = f"readings: expected {wanted - before} of {name!r} in {end:g} s, got {have - before}"
+                msg = f"readings: expected {wanted - before} of {quoted(name)} in {end:g} s, got {have - before}"
                 raise ValueError(msg)
         starts, self._counted = self._counted, stop
         return {
@@ -145,12 +146,12 @@ def _whole(name: str, stamps: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.i
         found = found.astype(np.int64)
     if found.dtype.kind not in "iu" or found.shape != shape or len(shape) != 1:
         msg = (
-            f"time_ns: expected a whole number of nanoseconds for each of the readings of {name!r}, shape {shape}, "
-            f"got {found.dtype} of shape {found.shape}"
+            f"time_ns: expected a whole number of nanoseconds for each of the readings of {quoted(name)}, "
+            f"shape {shape}, got {found.dtype} of shape {found.shape}"
         )
         raise ValueError(msg)
     if found.size and max(abs(int(found.min())), abs(int(found.max()))) > _LONGEST_NS:
-        msg = f"time_ns: expected stamps of {name!r} within 146 years of their epoch, got {int(found.max())}"
+        msg = f"time_ns: expected stamps of {quoted(name)} within 146 years of their epoch, got {int(found.max())}"
         raise ValueError(msg)
     return np.ascontiguousarray(found, dtype=np.int64)
 
@@ -183,7 +184,7 @@ def _rate_of(name: str, stamps: NDArray[np.int64]) -> float:
     spans = (stamps[over:] - stamps[:-over])[::over]
     period = float(np.median(spans)) / over if spans.size else 0.0
     if not period > 0.0:
-        msg = f"time_ns: expected at least two different stamps of {name!r}, or its rate in sample_rate_hz"
+        msg = f"time_ns: expected at least two different stamps of {quoted(name)}, or its rate in sample_rate_hz"
         raise ValueError(msg)
     return _SECOND / period
 

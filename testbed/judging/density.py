@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.stats import chi2
 
-from testbed.errors import Problem, ScenarioError
+from testbed.errors import Problem, ScenarioError, quoted
 from testbed.judging.allan_records import read
 from testbed.judging.allan_words import line_text
 from testbed.judging.run_signals import run_records
@@ -168,7 +168,7 @@ def estimate_density(
         If the record is too short, or the method is none of these.
     """
     if method not in METHODS:
-        raise ScenarioError([Problem(f"expected {' or '.join(METHODS)}, got {method!r}", key="--method")])
+        raise ScenarioError([Problem(f"expected {' or '.join(METHODS)}, got {quoted(method)}", key="--method")])
     if np.nanmin(record.rate) == np.nanmax(record.rate):
         message = f"expected a rate that changes, all are {np.degrees(np.nanmin(record.rate)):g} deg/s"
         raise ScenarioError([Problem(message, file=record.content)])
@@ -310,6 +310,6 @@ def band_edges(text: str) -> list[float]:
     edges = [quantity(part, "Hz", "10 Hz", "--bands") for part in text.split(",")]
     if len(edges) < 2 or any(a >= b for a, b in itertools.pairwise(edges)):
         raise ScenarioError(
-            [Problem(f"expected edges that increase, such as '0.1, 1, 100 Hz', got {text!r}", key="--bands")]
+            [Problem(f"expected edges that increase, such as '0.1, 1, 100 Hz', got {quoted(text)}", key="--bands")]
         )
     return edges

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-from testbed.pages.numbers import decade, plain, significant
+from testbed.pages.numbers import plain
 from testbed.pages.svg import INK
 
 if TYPE_CHECKING:
@@ -110,25 +110,6 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
 def label(group: str) -> str:
     """Return the instance's name; a dollar sign would start a formula."""
     return group.split("/", 1)[-1].replace("$", r"\$")
-
-
-def decade_axis(axes: Axes) -> None:
-    """Label the powers of ten of a logarithmic y axis whose limits stand, and 2 and 5 times them where fewer than two
-    are seen.
-
-    Not by matplotlib's own formatter: its typesetting of powers takes a quarter of the time of the whole report.
-
-    Parameters
-    ----------
-    axes : Axes
-        Whose y axis it is.
-    """
-    low, high = np.log10(axes.get_ylim())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    if np.floor(high) - np.ceil(low) < 1.0:
-        axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: significant(value, 1)))
 
 
 def time_axis(axes: Axes, span_s: float, *, named: bool = True) -> None:

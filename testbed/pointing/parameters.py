@@ -13,7 +13,7 @@ from testbed.inputs.files import beside_scenario
 from testbed.parts import Part
 from testbed.pointing.actuator import Dynamics, butterworth_mirror, measured_mirror
 from testbed.pointing.blend import Margins, butterworth_gains, loop_margins
-from testbed.units import Duration, Frequency, PositiveDuration, Quantity
+from testbed.units import DelayTime, Duration, Frequency, PositiveDuration, Quantity
 
 if TYPE_CHECKING:
     from pydantic import GetJsonSchemaHandler
@@ -77,7 +77,7 @@ class Tracker(Part):
     bandwidth: Frequency = 10.0
     noise: AngleDensity = 0.0
     rate: Frequency | None = None
-    latency: Duration = 0.0
+    latency: DelayTime = 0.0
     fades: tuple[Fade, ...] = ()
 
 
@@ -113,9 +113,9 @@ class Mirror(Part):
     numerator: Coefficients | None = None
     denominator: Coefficients | None = None
     rate: Frequency | None = None
-    latency: Duration = 0.0
+    latency: DelayTime = 0.0
     lead: Switch = False
-    assumed_latency: Duration | None = None
+    assumed_latency: DelayTime | None = None
     stroke: PositiveAngle | None = None
     rate_limit: AngleRate | None = None
 

@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import mix, rgb
-from testbed.recording.stream import FRAMES
-from testbed.recording.world import INK, nice_ceiling
+from testbed.recording.stream import FRAMES, INK
+from testbed.recording.world import nice_ceiling
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,11 +95,4 @@ class Channel:
             (0.0, 27.0, f"fluid minus wall, per radius [{self._unit}]"),
             (-right + 12.0, up - 16.0, "height above lower wall [mm]"),
         ]
-        places = rr.Points2D(
-            [text[:2] for text in texts],
-            labels=[text[2] for text in texts],
-            colors=rgb(INK),
-            radii=0.01,
-            show_labels=True,
-        )
-        self._recording.static(f"{self.entity}/labels", places)
+        self._recording.texts(f"{self.entity}/labels", texts)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 TIMELINE = "sim_time"
+INK = "#8a8f98"
 ROWS = 16384  # rows of scalars sent at once; the viewer cuts chunks to 4096 rows anyway
 FRAMES = 512  # rows of poses and profiles, which are larger
 
@@ -89,6 +90,12 @@ class Recording:
         rgbs = [rgb(color) for color in colors]
         style = rr.SeriesLines(names=names, colors=rgbs, widths=widths, aggregation_policy="MinMax")
         self.static(entity, style)
+
+    def texts(self, entity: str, texts: Sequence[tuple[float, float, str]]) -> None:
+        """Write words into a flat view, each at its place (x, y)."""
+        places = [(x, y) for x, y, _ in texts]
+        words = [text for _, _, text in texts]
+        self.static(entity, rr.Points2D(places, labels=words, colors=rgb(INK), radii=0.01, show_labels=True))
 
 
 class Batch:

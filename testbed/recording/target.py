@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import rgb
-from testbed.recording.stream import FRAMES
-from testbed.recording.world import INK, nice_ceiling
+from testbed.recording.stream import FRAMES, INK
+from testbed.recording.world import nice_ceiling
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,11 +85,4 @@ class Target:
         self._recording.static(f"{ENTITY}/axes", axes)
         labels += [(share * HALF, HALF + 14.0, f"{share * full:g}") for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
         labels.append((0.0, HALF + 39.0, "pointing error [µrad]"))
-        texts = rr.Points2D(
-            [place[:2] for place in labels],
-            labels=[place[2] for place in labels],
-            colors=rgb(INK),
-            radii=0.01,
-            show_labels=True,
-        )
-        self._recording.static(f"{ENTITY}/labels", texts)
+        self._recording.texts(f"{ENTITY}/labels", labels)

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from testbed.errors import RunError, ScenarioError
+from testbed.errors import RunError, ScenarioError, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -204,7 +204,7 @@ def settled_picture(client: ViewerClient, view: str | None = None) -> bytes:
 def _view_id(client: ViewerClient, name: str) -> str:
     views = {view.name: view.view_id for view in client.get_state().views}
     if name not in views:
-        msg = f"view: expected one of {', '.join(map(repr, views))}, got {name!r}"
+        msg = f"view: expected one of {', '.join(map(repr, views))}, got {quoted(name)}"
         raise RunError(msg)
     return str(views[name])
 

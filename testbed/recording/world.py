@@ -11,7 +11,7 @@ import rerun as rr
 
 from testbed.pages.palette import TRUTH, rgb
 from testbed.recording.bodies import draw_bodies
-from testbed.recording.stream import FRAMES, Batch
+from testbed.recording.stream import FRAMES, INK, Batch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 DIAL = "/world/dial"
 DIAL_RANGE = float(np.radians(40.0))
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-INK = "#8a8f98"
 
 
 class Extent(NamedTuple):

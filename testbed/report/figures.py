@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, draw, label, marked, time_axis
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -282,9 +282,7 @@ def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.set_xlabel("frequency [Hz]")
     of = "error" if digest.has_truth else "rate"
     axes.set_ylabel(f"{of} root density, two-sided [{unit[0]}/√Hz]")
-    axes.xaxis.set_major_locator(LogLocator(numticks=20))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    frequency_axis(axes)
     decade_axis(axes)
     axes.grid(visible=True)
     shown = [trace.freq_hz for trace in by_group(digest).values() if trace.freq_hz.size]

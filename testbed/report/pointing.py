@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
-from testbed.pages.numbers import plain, significant
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, frequency_axis
+from testbed.pages.numbers import significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.runs.table import window_text
@@ -170,9 +170,7 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
         above.set_ylabel("density, two-sided [µrad/√Hz]")
         below.set_ylabel("rms below the frequency [µrad]")
         below.set_xlabel("frequency [Hz]")
-        below.xaxis.set_major_locator(LogLocator(numticks=20))
-        below.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-        below.xaxis.set_minor_formatter(NullFormatter())
+        frequency_axis(below)
         for axes, decades in ((above, 6.0), (below, 3.5)):
             _last_decades(axes, decades)
             decade_axis(axes)

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, time_axis
+from testbed.pages.decades import decade_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.report.figures import DEG_S, Unit

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from testbed.errors import quoted
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -78,7 +80,7 @@ class Signals(Mapping[str, "FloatArray"]):
         if name.startswith("_") or name == "units":
             raise AttributeError(name)
         if name not in self.units:
-            msg = f"no signal {name!r} (there are {', '.join(self.units)})"
+            msg = f"no signal {quoted(name)} (there are {', '.join(self.units)})"
             raise AttributeError(msg)
         return self.read(name)
 

@@ -77,7 +77,7 @@ def _below(node: Any, step: str, *, remove: bool) -> Any:
 
 def _require(node: Any, place: Any) -> None:
     if isinstance(node, dict) and place not in node:
-        msg = f"has no {place!r} to be removed (there are {', '.join(node) or 'no keys'})"
+        msg = f"has no {quoted(place)} to be removed (there are {', '.join(node) or 'no keys'})"
         raise _KeyError(msg)
 
 
@@ -86,9 +86,13 @@ def _place(node: Any, step: str) -> Any:
     if isinstance(node, dict):
         return step
     if not isinstance(node, list):
-        msg = f"expected a mapping or a list to hold {step!r}, got {quoted(node)}"
+        msg = f"expected a mapping or a list to hold {quoted(step)}, got {quoted(node)}"
         raise _KeyError(msg)
     if not (step.isdecimal() and int(step) < len(node)):
-        msg = f"expected an index from 0 to {len(node) - 1}, got {step!r}" if node else f"the list is empty at {step!r}"
+        msg = (
+            f"expected an index from 0 to {len(node) - 1}, got {quoted(step)}"
+            if node
+            else f"the list is empty at {quoted(step)}"
+        )
         raise _KeyError(msg)
     return int(step)

@@ -124,7 +124,7 @@ class Fusion:
         for name in self.types:
             one = self.data_sheets.get(name)
             if one is None:
-                self._find(key, f"nothing is known of sensor {name!r}: no data sheet of a preset; {_REMEDY}")
+                self._find(key, f"nothing is known of sensor {quoted(name)}: no data sheet of a preset; {_REMEDY}")
             else:
                 belief[name] = one
         return belief if len(belief) == len(self.types) else None

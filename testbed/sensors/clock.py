@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 ClockError = Annotated[float, Quantity("", "20 ppm", above=-0.1, at_most=0.1)]
+Offset = Annotated[float, Quantity("s", "1 ms", at_least=0.0, at_most=3600.0)]
 # Ticks that are worked out at a time.
 _CHUNK = 4096
 
@@ -39,7 +40,7 @@ class OwnClock(Part):
 
     error: ClockError = 0.0
     walk: Duration = 0.0
-    offset: Duration = 0.0
+    offset: Offset = 0.0
 
 
 class Ticks:

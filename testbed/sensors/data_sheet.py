@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 from scipy.signal import butter
 
+from testbed.errors import quoted
 from testbed.units import Quantity, parse
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ class Sheet:
         if written is None:
             self.problems["order"] = "expected beside bandwidth, which is missing"
         elif isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= _MOST_POLES:
-            self.problems["order"] = f"expected a whole number of poles from 1 to {_MOST_POLES}, got {order!r}"
+            self.problems["order"] = f"expected a whole number of poles from 1 to {_MOST_POLES}, got {quoted(order)}"
         else:
             self._lay_low_pass(written, order)
 

@@ -22,7 +22,7 @@ from testbed.sensors.noise_terms import NoiseStage
 from testbed.sensors.sampled_noise import SampledNoise, Shape, sampled
 from testbed.sensors.stages import Surroundings
 from testbed.signals import random_stream
-from testbed.units import Duration, Frequency, Quantity, ScaleFactor, Temperature, Voltage
+from testbed.units import DelayTime, Frequency, Quantity, ScaleFactor, Temperature, Voltage
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -96,7 +96,7 @@ class MhdArs(Sensor, ElectronicTerms):
     second_pole: Frequency | None = None
     saturation: Saturation | None = None
     anti_alias: LowPass | None = None
-    delay: Duration = 0.0
+    delay: DelayTime = 0.0
     scale_factor: ScaleFactor
     adc_range: Voltage = 10.0
     adc_bits: Annotated[int, Field(strict=True, ge=2, le=32)] = 18

@@ -11,7 +11,7 @@ from testbed.parts import Part
 from testbed.sensors.analogue import DelayStage, LowPassStage
 from testbed.sensors.sampled_noise import Rational
 from testbed.signals import LinearFilter
-from testbed.units import Duration, Frequency, Quantity, Voltage
+from testbed.units import DelayTime, Duration, Frequency, Quantity, Voltage
 
 if TYPE_CHECKING:
     from testbed.sensors.analogue import AnalogueStage
@@ -120,7 +120,7 @@ class Delay(Part):
         d [s].
     """
 
-    time: Duration
+    time: DelayTime
 
     def response(self, freq_hz: FloatArray) -> ComplexArray:
         """Return output over input at `freq_hz` [Hz], shape (n_freq,) [-]."""

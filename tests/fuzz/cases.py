@@ -222,7 +222,7 @@ def response_text(rng):
         fields[rng.randrange(len(fields))] = rng.choice((*NUMBERS, "", "nan", "x", "0", "1,2"))
         rows[row] = ",".join(fields)
     if rng.random() < 0.3:
-        del rows[rng.randrange(len(rows)) :]
+        del rows[rng.randrange(1, len(rows)) :]
     if rng.random() < 0.3:
         rows[rng.randrange(len(rows))] = rng.choice(TOKENS)
     return "\n".join(rows)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -135,3 +138,16 @@ def test_a_list_of_the_wrong_length_beside_a_data_sheet_is_one_finding(position)
                 "sensors": {"mems_gyro": {"preset": "adis16505_filtered", "mounting": {"position": position}}},
             }
         )
+
+
+@pytest.mark.parametrize(
+    "ends", [["1 Hz", f"2 {'s' * 300}"], ["1 Hz", "s" * 300], [f"{'9' * 300} Hz", "1 s"], [f"-1 {'s' * 300}"] * 2]
+)
+@pytest.mark.parametrize("spread", ["linear", "log", "random", "latin_hypercube"])
+def test_ends_of_an_axis_are_not_echoed_whole(tmp_path, spread, ends):
+    (tmp_path / "base.yaml").write_text(BASE)
+    axis = json.dumps({spread: ends, "points": 3})
+    (tmp_path / "study.yaml").write_text(f"name: long\nbase: base.yaml\nvary: {{duration: {axis}}}\n")
+    with pytest.raises(ScenarioError, match="vary") as refused:
+        load_study(tmp_path / "study.yaml")
+    assert re.search(rf"(\w)\1{{{MOST_QUOTED}}}", str(refused.value)) is None

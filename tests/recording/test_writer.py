@@ -357,9 +357,10 @@ def test_lost_readings_are_marked_and_readings_that_were_not_due_are_not(synthet
 def test_a_profile_below_the_resolution_draws_no_axes_of_its_own(tmp_path, recwarn):
     """At standstill the fluid's velocity is arithmetic, 1e-90 rad/s: its scale would overflow single precision."""
     from testbed.recording.channel import Channel
+    from testbed.recording.stream import Recording
 
     calls = []
-    recording = SimpleNamespace(static=lambda *args: calls.append(args), columns=lambda *_: None, stream=None)
+    recording = Recording(SimpleNamespace(log=lambda *args, **_: calls.append(args)), None)
     channel = Channel.__new__(Channel)
     channel._unit = "deg/s"
     channel._largest, channel._heights, channel._color = 1e-90, np.array([0.0, 1e-3]), "#2f86d6"

@@ -227,7 +227,7 @@ def test_lines_of_a_group_differ_in_more_than_color(digest: Digest):
 def test_a_narrow_logarithmic_axis_is_labelled_between_the_powers_of_ten(limits, shown):
     from matplotlib.figure import Figure
 
-    from testbed.pages.axes import decade_axis
+    from testbed.pages.decades import decade_axis
 
     figure = Figure()
     axes = figure.subplots()

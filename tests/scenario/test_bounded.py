@@ -43,6 +43,18 @@ TABLE = {
         ("  kalman: {}", f"  kalman: {{belief: {{mhd_ars: {{numerator: [1], denominator: {[1] * 500}}}}}}}"),
         "at most 33",
     ),
+    "delay": (("preset: sx300", "preset: sx300, delay: 1e12 us"), "at most 1.0 s"),
+    "delay of a belief": (
+        ("  kalman: {}", "  kalman: {belief: {mhd_ars: {numerator: [1], denominator: [1], delay: 1e12 us}}}"),
+        "at most 1.0 s",
+    ),
+    "latency": (("fusion:", "pointing: {mirror: {bandwidth: 1 kHz, latency: 1e12 us}}\nfusion:"), "at most 1.0 s"),
+    "offset of a clock": (
+        ("preset: adis16505_filtered", "preset: adis16505_filtered, clock: {offset: 1e12 s}"),
+        "at most 3600.0 s",
+    ),
+    "sojourn": (("  kalman: {}", "  kalman: {type: imm, sojourn: 1e15 s}"), "at most 1000000.0 s"),
+    "ratios": (("  kalman: {}", "  kalman: {type: imm, ratios: [1.0e-300, 1]}"), "ratios.0"),
 }
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from testbed.cli.options import Output, PluginModules, RunDir, expanded
+from testbed.cli.options import Output, PluginModules, RunDir, WantedOutputs, expanded
 from testbed.cli.status import MISSED
 from testbed.errors import Problem, ScenarioError, quoted
 
@@ -75,10 +75,7 @@ def replay(
         str | None,
         typer.Option(metavar="FREQUENCIES", help="What the reference holds, such as '0.5, 10 Hz', for gain and phase."),
     ] = None,
-    outputs: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
-    ] = None,
+    outputs: WantedOutputs = None,
     out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/replay_<name>.")] = None,
     plugin: PluginModules = None,
 ) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.fusion.analysis.comparison import Compared, compared
 from testbed.fusion.analysis.continuity import continuity_findings
 from testbed.fusion.analysis.finding import Finding, Verdict
@@ -119,7 +120,7 @@ def _traces(
     for name, values in readings.items():
         if name not in time_ns or np.shape(values) != np.shape(time_ns[name]):
             got = np.shape(time_ns[name]) if name in time_ns else "none"
-            msg = f"time_ns: expected the stamps of the {np.size(values)} readings of {name!r}, got {got}"
+            msg = f"time_ns: expected the stamps of the {np.size(values)} readings of {quoted(name)}, got {got}"
             raise ValueError(msg)
         stamps[name] = np.asarray(time_ns[name], np.int64)
     first = min((int(one.min()) for one in stamps.values() if one.size), default=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,10 +11,9 @@ from pydantic import Field
 from testbed.fusion.base import BlockFilter, Rows
 from testbed.fusion.filters.kalman import KalmanParameters
 from testbed.fusion.kernels.literature import imm_kernel
-from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import FilterParameters, initial_state
 from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
-from testbed.units import DEG, PositiveDuration
+from testbed.units import DEG, Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +22,9 @@ if TYPE_CHECKING:
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
-Share = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+# Beyond that the chance to leave within a step is none in double precision, and a model once out never returns.
+Sojourn = Annotated[float, Quantity("s", "1 s", above=0.0, at_most=1e6)]
+Share = Annotated[float, Field(ge=1e-12, le=1e12)]
 
 
 class ImmParameters(FilterParameters):
@@ -41,7 +41,7 @@ class ImmParameters(FilterParameters):
     default_q: ClassVar[dict[int, float]] = KalmanParameters.default_q
 
     ratios: Annotated[tuple[Share, ...], Field(min_length=1, max_length=8)] = (0.01, 1.0, 100.0)
-    sojourn: PositiveDuration = 1.0
+    sojourn: Sojourn = 1.0
 
 
 class Imm(BlockFilter):
@@ -78,17 +78,8 @@ class Imm(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ImmParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        built = partial(
-            build_model,
-            belief,
-            sample_rate_hz,
-            order=parameters.order,
-            use_input_noise=parameters.use_input_noise,
-            coloured=parameters.coloured,
-            start=parameters.start,
-            any_ratio=True,
-        )
-        self.model, self._calmest, self._ratios = built(q=parameters.q), built(q=0.0), parameters.ratios
+        self.model, self._calmest = (parameters.build(belief, sample_rate_hz, q) for q in (parameters.q, 0.0))
+        self._ratios = parameters.ratios
         self._Q = self._mixed(self.model.Q, self._calmest.Q)
         self._even = even(self.model.F, self._Q)
         self._nodes: tuple[FloatArray, FloatArray] | None = None

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
+from testbed.errors import quoted
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
 from testbed.fusion.kernels.covariance import NODES
 from testbed.fusion.model import build_model
@@ -260,14 +261,14 @@ def _roles(belief: Mapping[str, SensorBelief], model: FusionModel) -> tuple[int,
     fast = 1 - slow
     if not belief[model.sensors[slow]].sees_constant:
         msg = (
-            f"belief: expected {model.sensors[slow]!r}, the quieter sensor at low frequency, to see a constant rate; "
-            "without that the error grows without bound"
+            f"belief: expected {quoted(model.sensors[slow])}, the quieter sensor at low frequency, to see a constant "
+            "rate; without that the error grows without bound"
         )
         raise ValueError(msg)
     name = model.sensors[fast]
     if ends[fast, 1] > ends[slow, 1] or model.strides[fast] != 1 or belief[name].output_noise == 0.0:
         msg = (
-            f"belief: expected {name!r}, the noisier sensor at low frequency, to be the quieter one at 1 kHz, "
+            f"belief: expected {quoted(name)}, the noisier sensor at low frequency, to be the quieter one at 1 kHz, "
             "to have the highest sample rate and an output_noise"
         )
         raise ValueError(msg)

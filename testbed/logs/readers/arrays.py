@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.errors import ScenarioError
+from testbed.errors import ScenarioError, quoted
 from testbed.logs.options import refusal
 from testbed.logs.table import TableColumn
 
@@ -81,14 +81,14 @@ class ArrayTable:
                 self._add_field(column, name, data)
             return
         if dtype.kind == "c":
-            self.notes.append(f"{column.name!r} was left out: complex numbers; save their parts")
+            self.notes.append(f"{quoted(column.name)} was left out: complex numbers; save their parts")
         if dtype.kind not in "iufbM" or len(shape) > 2 or not shape:
             return
         long = [axis for axis in range(len(shape)) if shape[axis] > 1] or [0]
         axis = max(long, key=lambda i: shape[i])
         n_parts = 1 if len(shape) == 1 else shape[1 - axis]
         if n_parts > _MOST_COMPONENTS:
-            self.notes.append(f"{column.name!r} was left out: {n_parts} components of a sample")
+            self.notes.append(f"{quoted(column.name)} was left out: {n_parts} components of a sample")
             return
         for i in range(n_parts):
             name = column.name if n_parts == 1 else f"{column.name}[{i}]" if column.name else f"column {i + 1}"
@@ -111,7 +111,7 @@ class ArrayTable:
         """Yield the wanted columns block by block; ScenarioError if the file claims far more than it can hold."""
         sizes = [self.columns[i].n_time or 0 for i in wanted]
         if len(set(sizes)) > 1:
-            names = ", ".join(f"{self.columns[i].name!r} {n}" for i, n in zip(wanted, sizes, strict=True))
+            names = ", ".join(f"{quoted(self.columns[i].name)} {n}" for i, n in zip(wanted, sizes, strict=True))
             raise refusal(self.path, f"expected columns of one length, got {names}", "--time")
         guard(self.path, self.format, 8 * sum(sizes))
         for start in range(0, sizes[0], _BLOCK):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.errors import quoted
 from testbed.logs.options import refusal
 from testbed.logs.readers.arrays import MOST_COLUMNS, damage_refused, exact, guard
 from testbed.logs.table import TableColumn
@@ -55,7 +56,7 @@ class ArrowTable:
             )
         self.columns = [TableColumn(name, unit, "", n_time) for name, unit, _ in self._parts]
         odd = [field.name for field in schema if not any(_parts(field)) and not _is_word(field.type)]
-        self.notes += [f"{name!r} was left out: its type holds no column of numbers" for name in odd]
+        self.notes += [f"{quoted(name)} was left out: its type holds no column of numbers" for name in odd]
         self.header = {
             k.decode(errors="replace"): v.decode(errors="replace") for k, v in (schema.metadata or {}).items()
         }

@@ -308,7 +308,7 @@ def _is_number(field: str) -> bool:
 def _remedy(field: str) -> str:
     if re.fullmatch(r"[0-9A-Fa-f]{2,8}", field):
         return "if these are hexadecimal words, write 0x before them"
-    return f"fill it, cut the record, give --missing {field!r} if that means none, or --drop-faulty"
+    return f"fill it, cut the record, give --missing {quoted(field)} if that means none, or --drop-faulty"
 
 
 class Dropped:
@@ -336,7 +336,7 @@ class Dropped:
 
     def said(self) -> list[str]:
         """Return how many there were, and the first."""
-        first = f"{self._count} lines that are not like the others were left out, the first {self._first!r}"
+        first = f"{self._count} lines that are not like the others were left out, the first {quoted(self._first)}"
         return [first] if self._count else []
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
+from testbed.errors import quoted
 from testbed.models.mhd_channel.chebyshev import even_operators
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ class ChannelStage:
 
     def __init__(self, modes: ChannelModes, sample_rate_hz: float) -> None:
         if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0.0):
-            msg = f"sample_rate_hz: expected a positive, finite rate in Hz, got {sample_rate_hz!r}"
+            msg = f"sample_rate_hz: expected a positive, finite rate in Hz, got {quoted(sample_rate_hz)}"
             raise ValueError(msg)
         self._modes = modes
         exponent = -modes.decay / sample_rate_hz
