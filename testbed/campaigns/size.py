@@ -5,18 +5,21 @@ from __future__ import annotations
 import contextlib
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from testbed.campaigns.agenda import CHUNK
+from testbed.campaigns.evaluate import by_itself
 from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.forecast import memory_so_far
+from testbed.chain.pipeline import Chain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from testbed.campaigns.study import Study
     from testbed.scenario.model import Scenario
 
+T = TypeVar("T")
 # Base samples that are played to see how long they take, after as many that compile.
 _TRIED = 4000
 # On the disk [byte]: a row; a point of the page, with its place in the figures; the page without any; a case.
@@ -49,10 +52,9 @@ def warm(study: Study) -> None:
     study : Study
         What will be played.
     """
-    scenario = study.cases[0].scenario
     # A case that fails is a row with its reason, which whoever plays it writes.
     with contextlib.suppress(Exception):
-        Lockstep([scenario], study.seeds[:1]).advance(min(_TRIED, scenario.n_time))
+        _tried(study.cases[0].scenario, study.seeds[:1])
 
 
 def size_of(study: Study, workers: int = 1) -> Size:
@@ -94,14 +96,22 @@ def size_of(study: Study, workers: int = 1) -> Size:
 
 def _tried(scenario: Scenario, seeds: Sequence[int]) -> tuple[float, float]:
     """Return what a task of a case takes once, and per base sample [s]."""
-    begun = time.process_time()
-    lockstep = Lockstep([scenario], seeds)
-    lockstep.foresee()
-    once = time.process_time() - begun
     tried = min(_TRIED, scenario.n_time)
+    if by_itself(scenario):
+        once, chain = _spent(lambda: Chain(scenario))
+        each, _ = _spent(lambda: chain.tried(tried))
+        return len(seeds) * once, len(seeds) * each / tried
+    once, lockstep = _spent(lambda: Lockstep([scenario], seeds))
+    shared, _ = _spent(lockstep.foresee)
+    each, _ = _spent(lambda: lockstep.advance(tried))
+    return once + shared, each / tried
+
+
+def _spent(task: Callable[[], T]) -> tuple[float, T]:
+    """Return the processor time of a call [s], and what it returned."""
     begun = time.process_time()
-    lockstep.advance(tried)
-    return once, (time.process_time() - begun) / tried
+    found = task()
+    return time.process_time() - begun, found
 
 
 def sweep_words(size: Size) -> str:

@@ -239,7 +239,8 @@ class Future:
 
     def result(self):
         if self._dies:
-            raise KilledWorker("key", None, 3)
+            key = "play"
+            raise KilledWorker(key, None, 3)
         return [{"case": self._task.case.number, "seed": seed, "status": "ok"} for seed in self._task.seeds]
 
     def release(self):

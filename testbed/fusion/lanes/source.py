@@ -151,8 +151,8 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
 
     States of lanes that share one covariance: `gains` (n_time, n_sensor, n) and `variance` (n_time, n_sensor) belong to
     the readings that are `due` (n_sensor, n_time). Z are LANES arrays (n_sensor, n_time), `innovation` is (n_lane,
-    n_sensor, n_time), `rate` (n_lane, n_time), of the first lanes as many as are wanted. The row ``worst`` holds the largest squared innovation over that of the
-    gate.
+    n_sensor, n_time), `rate` (n_lane, n_time), for as many of the first lanes as are wanted. The row ``worst`` holds
+    the largest squared innovation over that of the gate.
 
     Parameters
     ----------
@@ -195,8 +195,8 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
     The Sage-Husa family with R that adapts, a covariance per lane in Joseph form. `windows` (n_sensor, n_window, LANES)
     holds the squared innovations of the sliding windows, `common` (n_sensor,) one SENSOR record per sensor with what
     all lanes have in common, `seen` (n_sensor,) how many readings there were. Z are LANES arrays (n_sensor, n_time),
-    `innovation` and its `variance` are (n_lane, n_sensor, n_time), `rate` and `std` (n_lane, n_time), of the first lanes as
-    many as are wanted.
+    `innovation` and its `variance` are (n_lane, n_sensor, n_time), `rate` and `std` (n_lane, n_time), for as many of
+    the first lanes as are wanted.
 
     Parameters
     ----------
