@@ -30,7 +30,7 @@ _MULTIPLES = np.arange(2.0, 10.0)
 class Multiples(Artist):
     """Marks at 2 to 9 times the powers of ten of an axis, wherever its limits are when it is drawn.
 
-    They are drawn as one line: matplotlib's own ticks, five objects each, took half of the time of a report.
+    They are drawn as one line: matplotlib's own ticks are five objects each, and a report has hundreds of them.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Multiples(Artist):
 def label_powers(axis: Axis, words: Callable[[float], str] = decade, *, most: int | None = None) -> None:
     """Label the powers of ten of a logarithmic axis, and mark what lies between them.
 
-    Not by matplotlib's own formatter: its typesetting of powers takes a quarter of the time of the whole report.
+    Not by matplotlib's own formatter, which typesets every power as a formula.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from testbed.models.motions import MOTIONS
 from testbed.models.turntable import TurntableParameters
 from testbed.parts import preset_names, resolve
 from testbed.pointing.parameters import PointingParameters
-from testbed.scenario.model import Frame
+from testbed.scenario.frame import Frame
 from testbed.sensors import SENSORS
 
 _BELIEF = (
