@@ -91,7 +91,9 @@ class FixedFilters(FixedGains):
 
     Parameters
     ----------
-    model, K : FusionModel, ndarray
+    model : FusionModel
+        As for `FixedGains`.
+    K : ndarray, shape (n_step, n_q, n_state, n_sensor)
         As for `FixedGains`.
     q : ndarray, shape (n_q,)
         Signal noise of each filter [rad^2/s^(2m+1)].
