@@ -11,7 +11,7 @@ from matplotlib.axis import YAxis
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
-from testbed.pages.numbers import decade, plain, significant
+from testbed.pages.numbers import decade, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,7 +70,7 @@ class Multiples(Artist):
         self._line.draw(renderer)
 
 
-def label_powers(axis: Axis, words: Callable[[float], str] = decade, *, most: int | None = None) -> None:
+def label_powers(axis: Axis, words: Callable[[float], str] | None = None, *, most: int | None = None) -> None:
     """Label the powers of ten of a logarithmic axis, and mark what lies between them.
 
     Not by matplotlib's own formatter, which typesets every power as a formula.
@@ -80,11 +80,12 @@ def label_powers(axis: Axis, words: Callable[[float], str] = decade, *, most: in
     axis : Axis
         The x or y axis of some axes; what shares it is marked too.
     words : callable, optional
-        What a power is called.
+        What a power is called; else all are in one way of writing.
     most : int, optional
         Labels.
     """
-    axis.set_major_formatter(FuncFormatter(lambda value, _: words(value)))
+    called = words or (lambda value: decade(value, axis.get_view_interval()))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: called(value)))
     axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())
     if most is not None:
@@ -120,4 +121,4 @@ def decade_axis(axes: Axes) -> None:
     label_powers(axes.yaxis)
     if np.floor(high) - np.ceil(low) < 1.0:
         axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: significant(value, 1)))
+        axes.yaxis.set_minor_formatter(axes.yaxis.get_major_formatter())

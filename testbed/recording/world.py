@@ -52,6 +52,8 @@ class World:
         self._bodies: dict[str, Batch] = {}
         self._angles: list[FloatArray] = []
         self._index: list[NDArray[np.int64]] = []
+        self._largest, self._n_shown = 0.0, 0
+        self._scale: tuple[float, float] | None = None
         self._rotor = rotor_extent(model)
         recording.static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         draw_bodies(recording, model, colors, self._rotor.radius)
@@ -77,6 +79,9 @@ class World:
         self._index.append(index)
         # A copy: a view would keep the whole block alive.
         self._angles.append(angle.copy())
+        self._largest = max(self._largest, float(np.abs(angle).max(initial=0.0)))
+        if self._recording.live:
+            self._turn_needle()
 
     def _send(self, body: str, index: NDArray[np.int64], position: FloatArray, quaternion: FloatArray) -> None:
         # MuJoCo puts the scalar part first, Rerun last.
@@ -87,10 +92,20 @@ class World:
         """Send what is held back and draw the dial, whose magnification is known only when the largest angle is."""
         for batch in self._bodies.values():
             batch.flush()
-        index, angle = np.concatenate(self._index), np.concatenate(self._angles)
-        step, factor = dial_scale(float(np.abs(angle).max(initial=0.0)))
-        _draw_dial(self._recording, self._rotor, step, factor)
-        turned = np.column_stack((np.zeros((angle.size, 2)), np.sin(factor * angle / 2), np.cos(factor * angle / 2)))
+        self._turn_needle()
+
+    def _turn_needle(self) -> None:
+        """Add what is new of the needle; where the dial needs another scale, draw it and all of the needle in that."""
+        scale = dial_scale(self._largest)
+        if scale != self._scale:
+            self._scale, self._n_shown = scale, 0
+            _draw_dial(self._recording, self._rotor, *scale)
+        if self._n_shown == len(self._index):
+            return
+        index, angle = np.concatenate(self._index[self._n_shown :]), np.concatenate(self._angles[self._n_shown :])
+        self._n_shown = len(self._index)
+        half = scale[1] * angle / 2
+        turned = np.column_stack((np.zeros((angle.size, 2)), np.sin(half), np.cos(half)))
         self._recording.columns(f"{DIAL}/needle", index, rr.Transform3D.columns(quaternion=turned))
 
 

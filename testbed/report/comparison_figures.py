@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
 from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -133,7 +133,7 @@ def spectra_beside(
         handles: list[Line2D | Patch] = [
             Line2D(
                 [], [], color=colors[group], linewidth=2.2, label=label(group),
-                **(marked(mark, colors[group]) | {"linestyle": "-"}),
+                **on_area(mark, colors[group]),
             )
             for group, mark in marks.items()
         ]  # fmt: skip

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
 from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
@@ -99,7 +99,7 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
 
 def _in_legend(marks: Mapping[str, Mark], colors: Mapping[str, str], group: str) -> dict[str, Any]:
     """Return how the line of a filled area is in the legend: with its mark; the truth has none."""
-    return marked(marks[group], colors[group]) | {"linestyle": "-"} if group in marks else {"linestyle": DASHED}
+    return on_area(marks[group], colors[group]) if group in marks else {"linestyle": DASHED}
 
 
 def _dot_command(axes: Axes, digest: Digest, scale: float) -> bool:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked, on_area
 from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import significant
 from testbed.pages.palette import series_marks
@@ -120,7 +120,9 @@ def sight_budget_figure(sights: Mapping[str, PointingMetrics]) -> Figure:
         axes.set_xlabel("share of the residual's variance [%]; all of a bar add up to 100")
         axes.grid(visible=True, axis="x")
         arrange(figure, [Patch(label=part.replace("_", " "), **_area(part)) for part in parts])
-        figure.subplots_adjust(left=1.35 / WIDTH_IN)
+        # Names stand on the left, 0.075 in a letter.
+        longest = max(map(len, known), default=0)
+        figure.subplots_adjust(left=max(1.35, 0.25 + 0.075 * longest) / WIDTH_IN)
     return figure
 
 
@@ -164,7 +166,7 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
             look = {"color": color, **marked(mark, color, len(sight.curves.get("frequency_hz", [])))}
             _curves(above, below, sight, "residual", {**look, "linewidth": 2.0, "linestyle": "-"})
             _curves(above, below, sight, "knowledge", {**look, "linewidth": 1.3, "linestyle": _DOTTED})
-            style = marked(mark, color) | {"linestyle": "-"}
+            style = on_area(mark, color)
             handles.append(Line2D([], [], color=color, linewidth=2.2, label=label(name), **style))
         handles.append(Line2D([], [], color=INK, linewidth=1.3, linestyle=_DOTTED, label="knowledge"))
         above.set_ylabel("density, two-sided [µrad/√Hz]")
