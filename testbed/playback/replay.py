@@ -223,7 +223,8 @@ def prepare(
     # What is wrong is told before a long recording is read.
     _check_asked(settle, lines, opened)
     source = opened.read()
-    reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, fix=fix)
+    said = {name: 1.0 / abs(one.factor) for name, one in source.sensors.items() if one.kind == "rate"}
+    reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, said, fix=fix)
     reference = None if source.reference is None else wind(source.reference, middle=True)
     lineup = line_up(reels, reference, source.log)
     chosen_settle = min(_SETTLING * lineup.duration, _LONGEST_SETTLING) if settle is None else settle
