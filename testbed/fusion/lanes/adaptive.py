@@ -25,6 +25,8 @@ _OWN = (
     *("increment_variance", "window_sum", "band"),
 )
 _ALIKE = ("power", "increments", "window_count")
+# What the kernel finds, and whether for each sensor.
+_FOUND = {"rate": False, "std": False, "innovation": True, "variance": True}
 
 
 class AdaptiveLanes:
@@ -34,9 +36,11 @@ class AdaptiveLanes:
     ----------
     example : SageHusa
         One of them.
+    buffers : Buffers
+        For their estimates.
     """
 
-    def __init__(self, example: SageHusa) -> None:
+    def __init__(self, example: SageHusa, buffers: Buffers) -> None:
         n = len(example._x)
         source, self._rows = adaptive_source(pattern_of(example))
         self._run = module_of(source).run
@@ -47,7 +51,7 @@ class AdaptiveLanes:
         own = n + len(self._half[0])
         self._states, self._covariance = slice(0, n), slice(n, own)
         self._memory = [own + len(MEMORY) * i for i in range(len(example._H))]
-        self._buffers = Buffers({"rate": False, "std": False, "innovation": True, "variance": True})
+        self._buffers = buffers
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
         """Advance those filters of `whole` that count alike, and return their estimates by number.
@@ -68,7 +72,8 @@ class AdaptiveLanes:
         alike = [m for m in whole if not filters[m]._sensors["outside"].any() and _counted(filters[m]) == counted]
         done: dict[int, EstimateBlock] = {}
         for number, pack in enumerate(packs(alike)):
-            done |= self._pack(filters, received, pack, due, self._buffers.of(due, number))
+            arrays = self._buffers.of(due, number, len(pack), _FOUND)
+            done |= self._pack(filters, received, pack, due, arrays)
         return done
 
     def _pack(

@@ -29,8 +29,8 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
     The Sage-Husa family with R that adapts, a covariance per lane in Joseph form. `windows` (n_sensor, n_window, LANES)
     holds the squared innovations of the sliding windows, `common` (n_sensor,) one SENSOR record per sensor with what
     all lanes have in common, `seen` (n_sensor,) how many readings there were. Z are LANES arrays (n_sensor, n_time),
-    `innovation` and its `variance` are (LANES, n_sensor, n_time), `rate` and `std` (LANES, n_time); ``beyond`` is
-    that of `shared_source`.
+    `innovation` and its `variance` are (n_lane, n_sensor, n_time), `rate` and `std` (n_lane, n_time), for as many of
+    the first lanes as are wanted; ``beyond`` is that of `shared_source`.
 
     Parameters
     ----------

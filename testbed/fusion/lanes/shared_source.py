@@ -28,8 +28,9 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
 
     States of lanes that share one covariance: `gains` (n_time, n_sensor, n) and `variance` (n_time, n_sensor) belong to
     the readings that are `due` (n_sensor, n_time), in sets of `Pattern.together`. Z are LANES arrays (n_sensor,
-    n_time), `innovation` is (LANES, n_sensor, n_time), `rate` (LANES, n_time). The row ``beyond`` says by how much the
-    largest squared innovation is beyond the gate [rad^2/s^2], 0 if none is.
+    n_time), `innovation` is (n_lane, n_sensor, n_time), `rate` (n_lane, n_time), for as many of the first lanes as are
+    wanted. The row ``beyond`` says by how much the largest squared innovation is beyond the gate [rad^2/s^2], 0 if none
+    is.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def spread(Z, i, begin, n, first, stride, z):
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def collect(part, first, stride, found):
-    for s in range({LANES}):
+    for s in range(found.shape[0]):
         for k in range(first, found.shape[1], stride):
             found[s, k] = part[k, s]
 
