@@ -292,9 +292,11 @@ def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     lines = [freq for freq in digest.line_freq_hz if low <= freq <= high]
     for freq in lines:
         axes.axvline(freq, color=INK, linewidth=0.8, alpha=0.45, linestyle=(0, (1, 2)), zorder=0.5)
+    # Beside others there is no room for the unit, which the axis has.
+    unit_of = " Hz" if len(lines) <= 2 else ""
     for freq in lines if len(lines) <= MAX_LABELLED_LINES else []:
         axes.annotate(
-            f"{plain(freq)} Hz", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
+            f"{plain(freq)}{unit_of}", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
 
