@@ -5,6 +5,8 @@ Promised: at least 140 times faster than filterpy, whose H and R are worked out 
 -march=native, sizes fixed). Printed beside it: adaptive filters, meant to take at most 3 times the plain Kalman step,
 and `wideband`, 5 times faster than real time. C and filterpy do the recursion without what adapts: the plain filter;
 for `allan_srkf` filterpy's SquareRootKalmanFilter; for `wideband` sixteen times the filter of order 3 (seven states).
+The states of slow noise (belief `identified`) may cost `kalman` at most 3 times its step without them, and leave
+`wideband` at most 7 us.
 Run:
 python benchmarks/bench_kalman.py
 """
@@ -22,7 +24,7 @@ import numpy as np
 from promises import Promise, conclude
 
 from testbed.fusion import FILTERS
-from testbed.fusion.belief import default_belief
+from testbed.fusion.belief import default_belief, load_belief
 from testbed.fusion.kernels.covariance import kalman_kernel
 from testbed.fusion.model import FusionModel, build_model
 from testbed.fusion.transitions import even
@@ -110,6 +112,18 @@ def filterpy_run(model: FusionModel, Z: FloatArray) -> tuple[FloatArray, float]:
     return rate, time.process_time() - begin
 
 
+def slow_noise_us(name: str, blocks: dict[str, FloatArray], n: int) -> tuple[float, float]:
+    """Return the microseconds per step of a filter with states for slow noise and without; print them."""
+    cls = resolve("filter", name, FILTERS)
+    found = []
+    for coloured in (True, False):
+        stage = cls(load_belief("identified"), RATES, cls.Parameters(coloured=coloured))
+        stage.process(blocks)
+        found.append(best(functools.partial(stage.process, blocks), 5) / n * 1e6)
+    print(f"{name:20s} with states for slow noise {found[0]:.2f} us/step, without {found[1]:.2f}")
+    return found[0], found[1]
+
+
 def main() -> None:
     """Print microseconds per step and the ratios."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -172,7 +186,11 @@ def main() -> None:
         promise = "5 x real time" if name == "wideband" else "3 / kalman"
         faster = 1e6 / RATES["mhd_ars"] / step_us
         print(f"{name:20s} {step_us:9.3f}{in_c:8.3f}{other:10.1f}{step_us / plain_us:10.2f}{faster:11.1f}   {promise}")
+    with_states, without = slow_noise_us("kalman", blocks, n)
+    bank_us, _ = slow_noise_us("wideband", blocks, n)
     conclude(
+        Promise("step of kalman with states for slow noise over that without [-]", 3.0, with_states / without),
+        Promise("step of wideband with states for slow noise [us]", 7.0, bank_us),
         Promise("step of kalman, 5 states, over that of filterpy [-]", 140.0, peer / ours_us, at_most=False),
         Promise("step of kalman, 5 states, over that of C with -march=native [-]", 1.5, ours_us / plain_c),
     )

@@ -1,12 +1,12 @@
 """Bars of the self-calibrating filter: what it costs where nothing is wrong, and what is left of a planted error.
 
-    python benchmarks/bench_self_calibration.py [SEEDS] [kalman|wideband]
+    python benchmarks/bench_self_calibration.py [SEEDS] [kalman|wideband] [MOTION ...]
 
 1 % or -0.8 % of gain, 0.5 or 0.4 ms of delay of the MHD ARS, 1 deg/s at 0.5, 4 and 10 Hz and mixed, the last 10 s of
 20 s, from rest, belief equation (39): the mean error over the seeds at most 1.2 times that of the twin run without the
 error (of the filter inside alone) and 0.0004 deg/s. At rest, at 0.01 deg/s and on the jitter of a reaction wheel at
-most 5 % above the filter inside alone. What a delay leaves on the wheel, where it is not mended, is printed without a
-bar. Exits with 1 if a bar is missed.
+most 5 % above the filter inside alone. A delay on the wheel is found, but up to 150 Hz no filter makes up for it whole:
+there the twin is the filter inside on the same readings, told of the delay. Exits with 1 if a bar is missed.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from testbed.chain.pipeline import block_lengths
 from testbed.chain.truth import Truth
 from testbed.fusion import estimate
+from testbed.fusion.belief import load_belief
 from testbed.scenario.loader import as_scenario
 from testbed.sensors import load_preset
 from tests.records import DEG, FS, PRESETS, RATES, ramped, rms
@@ -43,8 +44,7 @@ ERRORS = {
     "0.5 ms": {"delay": 0.5e-3},
     "0.4 ms": {"delay": 0.4e-3},
 }
-# Of those, what is not mended on the wheel's jitter.
-UNMENDED = ("0.5 ms", "0.4 ms")
+DELAYS = ("0.5 ms", "0.4 ms")
 FACTOR, MARGIN, COST = 1.2, 4e-4, 1.05
 
 
@@ -60,20 +60,40 @@ def truth(signal):
     return ramped(lambda t: sum((a * DEG * np.sin(2.0 * np.pi * f * t) for f, a in LINES[signal]), np.zeros(t.size)))(t)
 
 
-def error(filters, signal, seed, change):
-    """Return the error of each filter [deg/s] over the last half."""
+def blocks(filters, signal, seed, change):
+    """Return the error of each filter [deg/s] over the last half, and what it says of gain and delay at the end."""
     rate = truth(signal)
     parts = {"mhd_ars": change, "mems_gyro": {}}
     sensors = {name: load_preset(preset).model_copy(update=parts[name]) for name, preset in PRESETS.items()}
     z = {name: sensor.start(FS, seed, name).process(rate) for name, sensor in sensors.items()}
-    half = rate.size // 2
-    given = {"sample_rate_hz": RATES, "start": "rest", "verdict": False}
-    return [rms((estimate(name, z, **given, **own).rate - rate)[half:]) / DEG for name, own in filters]
+    half, found = rate.size // 2, []
+    for name, own in filters:
+        block = estimate(name, z, sample_rate_hz=RATES, start="rest", verdict=False, **own)
+        last = {key: block.diagnostics[key][-1] for key in ("delay", "delay_std") if key in block.diagnostics}
+        found.append((rms((block.rate - rate)[half:]) / DEG, last))
+    return found
 
 
-def left_of(calibrating, signal, seeds, name):
-    """Return the mean error over the seeds [deg/s] with the error of that name."""
-    return np.mean([error([calibrating], signal, seed, ERRORS[name]) for seed in seeds])
+def errors(filters, signal, seeds, change):
+    """Return the mean error of each filter over the seeds [deg/s]."""
+    return np.mean([[error for error, _ in blocks(filters, signal, seed, change)] for seed in seeds], axis=0)
+
+
+def delayed_wheel(alone, calibrating, seeds, name):
+    """Print what a delay of that name leaves on the wheel and what is found of it; return whether the bar is missed."""
+    kind, own = alone
+    belief = load_belief("eq39")
+    told = kind, {**own, "belief": belief | {"mhd_ars": belief["mhd_ars"].model_copy(update=ERRORS[name])}}
+    rows = [blocks([alone, told, calibrating], WHEEL, seed, ERRORS[name]) for seed in seeds]
+    untold, known, left = np.mean([[error for error, _ in row] for row in rows], axis=0)
+    delay, std = (1e6 * np.array([row[2][1][key] for row in rows]) for key in ("delay", "delay_std"))
+    bar = FACTOR * known + MARGIN
+    print(
+        f"  {name}: {left:.5f} of at most {bar:.5f}; not told {untold:.5f}, told {known:.5f}; found "
+        f"{delay.mean():.0f} us, seed by seed +- {delay.std(ddof=min(1, len(rows) - 1)):.0f}, said +- {std.mean():.0f}",
+        flush=True,
+    )
+    return left > bar
 
 
 def main() -> int:
@@ -82,18 +102,18 @@ def main() -> int:
     kind = sys.argv[2] if len(sys.argv) > 2 else "kalman"
     alone, calibrating = (kind, INNER[kind]), ("self_calibrating", {"filter": {kind: INNER[kind]}})
     missed = 0
-    for signal in (WHEEL, *reversed(LINES)):
-        right = np.mean([error([alone, calibrating], signal, seed, {}) for seed in seeds], axis=0)
+    for signal in sys.argv[3:] or (WHEEL, *reversed(LINES)):
+        right = errors([alone, calibrating], signal, seeds, {})
         line = f"{kind}, {signal}: alone {right[0]:.5f}, self-calibrating {right[1]:.5f}"
         if signal == WHEEL or len(LINES[signal]) == 0 or LINES[signal][0][1] < 1.0:
             missed += right[1] > COST * right[0]
             print(f"{line}, {right[1] / right[0]:.3f} of at most {COST}", flush=True)
-            for name in UNMENDED if signal == WHEEL else ():
-                print(f"  {name}: {left_of(calibrating, signal, seeds, name):.5f}, no bar", flush=True)
+            for name in DELAYS if signal == WHEEL else ():
+                missed += delayed_wheel(alone, calibrating, seeds, name)
             continue
         print(line, flush=True)
-        for name in ERRORS:
-            left = left_of(calibrating, signal, seeds, name)
+        for name, change in ERRORS.items():
+            left = errors([calibrating], signal, seeds, change)[0]
             bar = FACTOR * right[0] + MARGIN
             missed += left > bar
             print(f"  {name}: {left:.5f} of at most {bar:.5f}", flush=True)

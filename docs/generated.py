@@ -19,7 +19,7 @@ from testbed.campaigns.regression.leaderboard import standings
 from testbed.campaigns.regression.page import entries_of
 from testbed.campaigns.regression.standard import AXES, STANDARD
 from testbed.cli.app import app
-from testbed.scenario.model import Frame
+from testbed.scenario.frame import Frame
 from testbed.scenario.schema import schema
 
 if TYPE_CHECKING:

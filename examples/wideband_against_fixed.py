@@ -3,15 +3,15 @@
 Simulated `sx300` and `adis16505_filtered` with all their noise, belief `identified`, phase included. Each record begins
 in mid-motion, at an instant drawn by its seed, and no filter knows anything of its start; with ``--start rest`` the
 motion begins on a table at rest, and the filters know it. Judged are the root mean squares over all seeds in the second
-quarter and in the second half. The fixed filters are `kalman` of order 3 on a decade grid of q, on the same readings;
-the grid is followed until the best one has a worse one on either side. The wheel is that of
-scenarios/satellite_microvibration.yaml: alone, through a run-up from 20 to 60 rev/s, and on the vibration of its
-platform.
+quarter and in the second half. The fixed filters are `kalman` of orders 1, 2 and 3 on the same readings; their q is
+followed, decade by decade and then by quarters of one, until the best one has a worse one on either side. The wheel is
+that of scenarios/satellite_microvibration.yaml: alone, through a run-up from 20 to 60 rev/s, and on the vibration of
+its platform.
 
 Run it with ``python examples/wideband_against_fixed.py [--signals "10 Hz" mixed] [--csv FILE]`` for two seeds of 4 s
 and two signals, which is a look and no measurement. ``--full`` is what the page says: ten seeds of 20 s, of all signals
-unless some are named, about 70 s of processor time each. ``--mismatch`` prints the table of wrong beliefs instead,
-``--change`` the one of changing signals, both from rest. ``--filters`` and ``--restart`` give `wideband` other
+unless some are named, about half a minute of processor time each. ``--mismatch`` prints the table of wrong beliefs
+instead, ``--change`` the one of changing signals, both from rest. ``--filters`` and ``--restart`` give `wideband` other
 parameters than its own in the first and the last, to see what they are for.
 """
 
@@ -27,9 +27,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import testbed
-from testbed.fusion import estimate
+from testbed.fusion import FILTERS, estimate
+from testbed.fusion.base import Received
 from testbed.fusion.belief import SensorBelief, load_belief
+from testbed.fusion.lanes.together import Together
 from testbed.models.motions.sine import Sine
+from testbed.parts import resolve
 from testbed.sensors import load_preset
 from testbed.signals import random_stream
 from testbed.units import DEG
@@ -40,6 +43,9 @@ if TYPE_CHECKING:
     from testbed.models.motion import Motion
     from testbed.signals import FloatArray
 
+    # Rate and readings [rad/s].
+    Record = tuple[FloatArray, dict[str, FloatArray]]
+
 # Seeds and length of a record [s], and the signals of a look.
 FULL, SHORT, LOOK = (10, 20.0), (2, 4.0), ("mixed", "100 Hz")
 RATES = {"mhd_ars": 20_000.0, "mems_gyro": 2_000.0}
@@ -48,6 +54,9 @@ BELIEF = load_belief("identified")
 # No parameter of the filter was chosen on these.
 FIRST_SEED = 101
 SATELLITE = Path(__file__).parents[1] / "scenarios" / "satellite_microvibration.yaml"
+# Of the search for the best q, in decades; and where it begins for the lower orders: there the filter has the same
+# bandwidth, (q / S)^(1 / 2m), S the density of the MHD ARS's noise [(deg/s)^2 s], as a logarithm.
+STEPS, ORDERS, LOG10_S = (1.0, 0.25), (1, 2, 3), -10.5
 SINES_HZ = (0.1, 0.5, 2.0, 4.0, 10.0, 25.0, 100.0, 300.0, 500.0)
 # Asked for: error over that of the best fixed filter, at most, and claim over error; from rest also the error [deg/s].
 RATIO, CLAIM = 1.15, (0.7, 1.4)
@@ -93,9 +102,7 @@ def readings(rate: FloatArray, seed: int, *, noise: bool = True) -> dict[str, Fl
     }
 
 
-def record(
-    motions: Sequence[Motion], duration: float, seed: int, start: str
-) -> tuple[FloatArray, dict[str, FloatArray]]:
+def record(motions: Sequence[Motion], duration: float, seed: int, start: str) -> Record:
     """Return rate and readings [rad/s] of a record that begins with the motion, on a table at rest, or in the middle of
     it, at an instant drawn by the seed.
     """
@@ -108,16 +115,21 @@ def record(
     return rate[round(RUN_UP * RATES["mhd_ars"]) :], cut
 
 
-def errors_and_claims(
-    name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
-) -> FloatArray:
-    """Return the error of a filter over the second quarter and over the second half, and the standard deviations that
-    it claims there [deg/s], shape (2, 2).
+def errors_and_claims(name: str, records: Sequence[Record], start: str, **own: object) -> FloatArray:
+    """Return the error of a filter over the second quarter and over the second half of each record, and the standard
+    deviations that it claims there [deg/s], shape (n_seed, 2, 2). Where the filter can, the seeds go side by side.
     """
-    block = estimate(name, z, sample_rate_hz=RATES, belief=belief, verdict=False, **{"start": "rest", **own})
-    n = rate.size
-    windows = slice(n // 4, n // 2), slice(n // 2, None)
-    return np.array([[rms(of[part]) / DEG for part in windows] for of in (block.rate - rate, block.std)])
+    kind = resolve("filter", name, FILTERS)
+    filters = [kind(BELIEF, RATES, kind.Parameters(start=start, **own)) for _ in records]
+    received = [one.received(z) for one, (_, z) in zip(filters, records, strict=True)]
+    together, n, squares = Together(filters[0]), records[0][0].size, []
+    for part in (slice(k * n // 4, (k + 1) * n // 4) for k in range(4)):
+        blocks = together.process(filters, [Received(Z[:, part], gated[:, part], None) for Z, gated, _ in received])
+        errors = [block.rate - rate[part] for block, (rate, _) in zip(blocks, records, strict=True)]
+        squares.append([[rms(error) ** 2, rms(block.std) ** 2] for error, block in zip(errors, blocks, strict=True)])
+    _, second, third, fourth = np.array(squares)
+    found: FloatArray = np.sqrt(np.stack([second, 0.5 * (third + fourth)], axis=-1)) / DEG
+    return found
 
 
 def rms(values: FloatArray) -> float:
@@ -128,34 +140,37 @@ def rms(values: FloatArray) -> float:
 def rmse(
     name: str, z: dict[str, FloatArray], rate: FloatArray, belief: dict[str, SensorBelief], **own: object
 ) -> float:
-    """Return the error of a filter over the second half [deg/s]."""
-    return float(errors_and_claims(name, z, rate, belief, **own)[0, 1])
+    """Return the error of a filter over the second half of a record from rest [deg/s]."""
+    block = estimate(name, z, sample_rate_hz=RATES, belief=belief, start="rest", verdict=False, **own)
+    return rms((block.rate - rate)[rate.size // 2 :]) / DEG
 
 
-def order_three(decade: int) -> dict[str, Any]:
-    """Return the parameters of the fixed filter with q = 10^decade (deg/s)^2/s^5."""
-    return {"order": 3, "q": 10.0**decade * DEG**2}
+def fixed(log10_q: float, order: int = 3) -> dict[str, Any]:
+    """Return the parameters of the fixed filter with q = 10^log10_q (deg/s)^2/s^(2 order - 1)."""
+    return {"order": order, "q": 10.0**log10_q * DEG**2}
 
 
-def best_fixed(errors: Callable[[int], FloatArray], decade: int) -> tuple[int, FloatArray]:
-    """Return the decade whose errors have the least root mean square, worse ones on either side of it, and the errors
-    of its seeds.
+def best_fixed(errors: Callable[[float], FloatArray], log10_q: float) -> tuple[float, FloatArray]:
+    """Return the log10 of q whose errors have the least root mean square, worse ones a quarter of a decade on either
+    side of it, and the errors of its seeds.
     """
-    known = {d: errors(d) for d in (decade - 1, decade, decade + 1)}
-    while True:
-        best = min(known, key=lambda d: rms(known[d]))
-        beside = [d for d in (best - 1, best + 1) if d not in known]
-        if not beside:
-            return best, known[best]
-        known[beside[0]] = errors(beside[0])
+    known: dict[float, FloatArray] = {}
+    for step in STEPS:
+        best = None
+        while best != log10_q:
+            best, near = log10_q, (log10_q, log10_q - step, log10_q + step)
+            known |= {one: errors(one) for one in near if one not in known}
+            log10_q = min(near, key=lambda one: rms(known[one]))
+    return log10_q, known[log10_q]
 
 
 @dataclass(frozen=True)
 class Judgement:
     """Errors of `wideband` and of the best fixed filter for one signal, root mean squares over all seeds [deg/s].
 
-    `begin` and `end` say over which seconds of the records; `ratio` is error over error, `claim` what `wideband` claims
-    over its error.
+    `begin` and `end` say over which seconds of the records, `order_1` to `order_3` what the best fixed filter of that
+    order has; `order` and `log10_q` are those of the best of all. `ratio` is error over error, `claim` what `wideband`
+    claims over its error.
     """
 
     signal: str
@@ -164,8 +179,11 @@ class Judgement:
     seeds: int
     wideband: float
     largest: float
-    fixed: float
-    fixed_log10_q: int
+    order_1: float
+    order_2: float
+    order_3: float
+    order: int
+    log10_q: float
     ratio: float
     claim: float
 
@@ -178,19 +196,22 @@ def judge(
     """
     motions, decade = signals()[label]
     records = [record(motions, duration, seed, start) for seed in seeds]
+    mine = errors_and_claims("wideband", records, start, **own)
 
     @functools.cache
-    def found(name: str, decade: int | None = None) -> FloatArray:
-        parameters = own if decade is None else order_three(decade)
-        return np.array([errors_and_claims(name, z, rate, BELIEF, start=start, **parameters) for rate, z in records])
+    def found(log10_q: float, order: int) -> FloatArray:
+        return errors_and_claims("kalman", records, start, **fixed(log10_q, order))[:, 0]
 
     judgements = []
     for k, (begin, end) in enumerate(((0.25 * duration, 0.5 * duration), (0.5 * duration, duration))):
-        ours, claims = found("wideband")[:, :, k].T
-        at, theirs = best_fixed(lambda d, k=k: found("kalman", d)[:, 0, k], decade)
-        error, other = rms(ours), rms(theirs)
-        figures = error, float(ours.max()), other, at, error / other, rms(claims) / error
-        judgements.append(Judgement(label, begin, end, len(seeds), *figures))
+        ours, claims = mine[:, :, k].T
+        first = {order: round(LOG10_S + (decade - LOG10_S) * order / 3) for order in ORDERS}
+        best = {m: best_fixed(lambda q, m=m, k=k: found(q, m)[:, k], first[m]) for m in ORDERS}
+        theirs = {m: rms(errors) for m, (_, errors) in best.items()}
+        order = min(theirs, key=lambda m: theirs[m])
+        error = rms(ours)
+        figures = error, float(ours.max()), *theirs.values(), order, best[order][0], error / theirs[order]
+        judgements.append(Judgement(label, begin, end, len(seeds), *figures, rms(claims) / error))
     return judgements[0], judgements[1]
 
 
@@ -199,8 +220,8 @@ def against_fixed(
 ) -> None:
     """Print two lines per signal, and write them to a file."""
     print(
-        f"{'signal':>16}  seconds wideband  largest    fixed   its q   ratio  claim   deg/s, start {start}, "
-        f"{len(seeds)} seeds"
+        f"{'signal':>16}  seconds wideband  largest  order 1  order 2  order 3    order, q   ratio  claim   deg/s, "
+        f"start {start}, {len(seeds)} seeds"
     )
     rows = []
     for label in labels:
@@ -209,8 +230,9 @@ def against_fixed(
             met = row.ratio <= RATIO and CLAIM[0] <= row.claim <= CLAIM[1]
             met = met and (start == "unknown" or row.wideband <= TARGETS.get(label, np.inf))
             print(
-                f"{label:>16}{f'{row.begin:g}-{row.end:g}':>9}{row.wideband:9.5f}{row.largest:9.5f}{row.fixed:9.5f}"
-                f"{'1e' + str(row.fixed_log10_q):>8}{row.ratio:8.3f}{row.claim:7.2f}   {'met' if met else 'MISSED'}",
+                f"{label:>16}{f'{row.begin:g}-{row.end:g}':>9}{row.wideband:9.5f}{row.largest:9.5f}"
+                f"{row.order_1:9.5f}{row.order_2:9.5f}{row.order_3:9.5f}{f'{row.order}, 1e{row.log10_q:g}':>12}"
+                f"{row.ratio:8.3f}{row.claim:7.2f}   {'met' if met else 'MISSED'}",
                 flush=True,
             )
     if target:
@@ -239,7 +261,7 @@ def mismatch_ratios(
     readings without noise.
     """
     rate = truth([sine(freq)], duration)
-    forced = rmse("kalman", readings(rate, 0, noise=False), rate, wrong, **order_three(decade))
+    forced = rmse("kalman", readings(rate, 0, noise=False), rate, wrong, **fixed(decade))
     rows = []
     for seed in seeds:
         z = readings(rate, seed)

@@ -85,21 +85,34 @@ def resolve(kind: str, name: str, registry: Mapping[str, str], plugins: Plugins 
     return cast("type[Any]", getattr(importlib.import_module(module), attribute))
 
 
-def preset_names(package: str) -> list[str]:
-    """Return the names of the presets shipped in `package`'s folder `presets`."""
-    folder = resources.files(package) / "presets"
-    return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+def preset_names(package: str, folder: str = "presets") -> list[str]:
+    """Return the names of the YAML files that `package` ships in a folder."""
+    entries = (resources.files(package) / folder).iterdir()
+    return sorted(entry.name.removesuffix(".yaml") for entry in entries if entry.name.endswith(".yaml"))
 
 
 @functools.cache
-def _preset(package: str, name: str) -> dict[str, Any]:
+def read_shipped(kind: str, package: str, folder: str, name: str) -> dict[str, Any]:
+    """Return the content of a YAML file that is shipped, the same each time: it is not to be changed.
+
+    Parameters
+    ----------
+    kind : str
+        What it is, for the message.
+    package, folder, name : str
+        Where it is, and its name without ending.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such file; lists the known ones.
+    """
     from ruamel.yaml import YAML
 
-    names = preset_names(package)
+    names = preset_names(package, folder)
     if name not in names:
-        kind = "preset"
         raise UnknownNameError(kind, name, names)
-    text = (resources.files(package) / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
+    text = (resources.files(package) / folder / f"{name}.yaml").read_text(encoding="utf-8")
     return cast("dict[str, Any]", YAML(typ="safe", pure=True).load(text))
 
 
@@ -111,7 +124,7 @@ def preset(package: str, name: str) -> dict[str, Any]:
     UnknownNameError
         If there is no such preset; lists the known ones.
     """
-    return copy.deepcopy(_preset(package, name))
+    return copy.deepcopy(read_shipped("preset", package, "presets", name))
 
 
 def merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:

@@ -327,7 +327,6 @@ class Quantity:
 
 Angle = Annotated[float, Quantity("rad", "5 mrad")]
 AngularAcceleration = Annotated[float, Quantity("rad/s^2", "0.1 deg/h/s")]
-Current = Annotated[float, Quantity("A", "2 A", at_least=0.0)]
 Duration = Annotated[float, Quantity("s", "20 s", at_least=0.0)]
 # A delay is a line of samples; a second of it is more than any instrument has.
 DelayTime = Annotated[float, Quantity("s", "200 us", at_least=0.0, at_most=1.0)]
@@ -344,7 +343,6 @@ AngularDrag = Annotated[float, Quantity("N*m*s/rad", "0.5 mN*m*s/rad", at_least=
 Rate = Annotated[float, Quantity("rad/s", "1 deg/s")]
 Range = Annotated[float, Quantity("rad/s", "30 deg/s", above=0.0)]
 RateStd = Annotated[float, Quantity("rad/s", "2.7 deg/h", at_least=0.0)]
-RateVariance = Annotated[float, Quantity("rad^2/s^2", "6.5e-7 (deg/s)^2", at_least=0.0)]
 RatePsd = Annotated[float, Quantity("rad^2/s", "1e-6 (deg/s)^2/Hz", at_least=0.0, cycle_is_number=True)]
 RateDensity = Annotated[float, Quantity("rad*s^-0.5", "0.15 deg/sqrt(h)", at_least=0.0, cycle_is_number=True)]
 RateRandomWalk = Annotated[float, Quantity("rad*s^-1.5", "0.1 deg/h/sqrt(h)", at_least=0.0, cycle_is_number=True)]
@@ -363,4 +361,3 @@ RatePerKelvin = Annotated[float, Quantity("rad/s/K", "0.005 deg/s/K")]
 RatePerAcceleration = Annotated[float, Quantity("rad*s/m", "0.01 deg/s/g0")]
 Voltage = Annotated[float, Quantity("V", "10 V", above=0.0)]
 ScaleFactor = Annotated[float, Quantity("V*s/rad", "20 mV/(deg/s)", above=0.0)]
-WordScale = Annotated[float, Quantity("rad/s", "0.38 udeg/s", above=0.0)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 import importlib
 import inspect
@@ -57,9 +58,14 @@ LOOSE = FOUNDATION | {"__init__", "__main__"}
 MODULES = sorted(path for path in ROOT.rglob("*.py"))
 
 
+@functools.cache
+def tree_of(path):
+    return ast.parse(path.read_text())
+
+
 def imports_of(path):
     """Yield the names below `testbed` that a module imports, at any depth of its code."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "testbed":
             parts = node.module.split(".")
             yield from [parts[1]] if len(parts) > 1 else [alias.name for alias in node.names]
@@ -71,8 +77,7 @@ def modules_of(path):
     """Yield the dotted modules of the package that a module imports when it is loaded (not those for types, nor inside
     functions).
     """
-    waiting = list(ast.parse(path.read_text()).body)
-    known = {dotted(other) for other in MODULES}
+    waiting, known = list(tree_of(path).body), known_modules()
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
@@ -86,6 +91,11 @@ def modules_of(path):
             waiting.extend(ast.iter_child_nodes(node))
 
 
+@functools.cache
+def known_modules():
+    return {dotted(path) for path in MODULES}
+
+
 def dotted(path):
     return ".".join(("testbed", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
 
@@ -94,18 +104,28 @@ def room_of(path):
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
+# One test over all of something rather than a test of each: two thousand of them took more time than what they look at.
+def offenders(of, look):
+    """Return what `look` finds of each thing, by the thing's name, where it finds anything."""
+    found = {str(one.relative_to(ROOT) if isinstance(one, Path) else one): look(one) for one in of}
+    return {name: fault for name, fault in found.items() if fault}
+
+
 @pytest.mark.contract
-@pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in ROOMS], ids=lambda p: str(p.relative_to(ROOT)))
-def test_rooms_import_one_way(path):
+def test_rooms_import_one_way():
     """Signals <- models <- sensors; fusion and compensation know neither, so the truth cannot leak into them."""
-    room = room_of(path)
-    assert set(imports_of(path)) <= FOUNDATION | ROOMS[room] | {room}
+
+    def beyond(path):
+        room = room_of(path)
+        return set(imports_of(path)) - FOUNDATION - ROOMS[room] - {room}
+
+    assert offenders([path for path in MODULES if room_of(path) in ROOMS], beyond) == {}
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("path", [p for p in MODULES if room_of(p) in TOP], ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_top_rooms_do_not_know_what_is_above_them(path):
-    assert not set(imports_of(path)) & TOP[room_of(path)]
+def test_the_top_rooms_do_not_know_what_is_above_them():
+    tops = [path for path in MODULES if room_of(path) in TOP]
+    assert offenders(tops, lambda path: set(imports_of(path)) & TOP[room_of(path)]) == {}
 
 
 @pytest.mark.contract
@@ -139,10 +159,9 @@ def test_rooms_form_no_circle():
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize("name", sorted(FOUNDATION))
-def test_the_foundation_knows_no_room(name):
-    for path in [path for path in MODULES if room_of(path) == name]:
-        assert set(imports_of(path)) <= FOUNDATION
+def test_the_foundation_knows_no_room():
+    foundation = [path for path in MODULES if room_of(path) in FOUNDATION]
+    assert offenders(foundation, lambda path: set(imports_of(path)) - FOUNDATION) == {}
 
 
 # Every paper's module has a `report`. The functions of the command line are named as its commands.
@@ -156,7 +175,7 @@ def test_a_public_name_has_one_meaning():
     for path in MODULES:
         if path.parent.name == "commands":
             continue
-        for node in ast.parse(path.read_text()).body:
+        for node in tree_of(path).body:
             if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(dotted(path))
     # The overloads of a function are one name in one place.
@@ -216,43 +235,51 @@ def documented(doc, argument):
     return re.search(rf"^\s*(?:[\w*]+, )*\*{{0,2}}{re.escape(argument)}(?:, [\w*]+)* : ", doc, re.MULTILINE) is not None
 
 
-@pytest.mark.contract
-@pytest.mark.parametrize("name", sorted(CALLABLES))
-def test_docstring_names_every_argument(name):
-    """A docstring with a Parameters section must name all arguments; every public thing has a docstring."""
+def undocumented(name):
+    """Return the arguments that a docstring with a Parameters section does not name."""
     item = CALLABLES[name]
     doc = inspect.getdoc(item) or ""
-    assert doc, "no docstring"
     function = item.__init__ if inspect.isclass(item) else item
     if "Parameters\n---" not in doc or not inspect.isfunction(inspect.unwrap(function)):
-        return
+        return [] if doc else ["no docstring"]
     arguments = [
         p
         for p in inspect.signature(function).parameters
         if p not in {"self", "data", "args", "kwargs"} and not p.startswith("_")
     ]
-    assert [argument for argument in arguments if not documented(doc, argument)] == []
+    return [argument for argument in arguments if not documented(doc, argument)]
+
+
+def unexplained(name):
+    """Return the fields of a parameter set that neither it nor what it inherits from explains."""
+    item = CALLABLES[name]
+    doc = "\n".join(inspect.getdoc(base) or "" for base in item.__mro__ if hasattr(base, "model_fields"))
+    return [field for field in item.model_fields if not documented(doc, field)]
+
+
+def shapeless(name):
+    """Return the lines of a docstring that have an array without its shape."""
+    lines = (inspect.getdoc(CALLABLES[name]) or "").splitlines()
+    return [line for line in lines if re.search(r"\bndarray\b", line) and " : " in line and "shape" not in line]
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize(
-    "name",
-    [name for name in sorted(CALLABLES) if inspect.isclass(CALLABLES[name]) and issubclass(CALLABLES[name], Part)],
-)
-def test_docstring_of_a_parameter_set_names_every_field(name):
+def test_docstring_names_every_argument():
+    """A docstring with a Parameters section must name all arguments; every public thing has a docstring."""
+    assert len(CALLABLES) > 500
+    assert offenders(CALLABLES, undocumented) == {}
+
+
+@pytest.mark.contract
+def test_docstring_of_a_parameter_set_names_every_field():
     """What `testbed list` and the schema offer is explained where it is defined; inherited fields where they are
     inherited from.
     """
-    item = CALLABLES[name]
-    doc = "\n".join(inspect.getdoc(base) or "" for base in item.__mro__ if hasattr(base, "model_fields"))
-    assert [field for field in item.model_fields if not documented(doc, field)] == []
+    sets = [name for name, item in CALLABLES.items() if inspect.isclass(item) and issubclass(item, Part)]
+    assert len(sets) > 50
+    assert offenders(sets, unexplained) == {}
 
 
 @pytest.mark.contract
-@pytest.mark.parametrize(
-    "name", [name for name in sorted(CALLABLES) if "ndarray" in (inspect.getdoc(CALLABLES[name]) or "")]
-)
-def test_docstring_of_an_array_has_its_shape(name):
-    for line in (inspect.getdoc(CALLABLES[name]) or "").splitlines():
-        if re.search(r"\bndarray\b", line) and " : " in line:
-            assert "shape" in line, line
+def test_docstring_of_an_array_has_its_shape():
+    assert offenders(CALLABLES, shapeless) == {}

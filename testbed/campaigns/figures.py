@@ -15,7 +15,7 @@ from testbed.pages.palette import Mark, color_of, series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
@@ -28,27 +28,27 @@ _ROOMS = {"sensor": "sensors", "filter": "fusion"}
 _LOGARITHMIC = 9.0
 
 
-def figures_of(found: Summary, axes: Sequence[str]) -> dict[str, Figure]:
+def figures_of(found: Summary, axes: Mapping[str, str]) -> dict[str, Figure]:
     """Return the figures that a campaign has: curves over its first axis of numbers, a map over two of them.
 
     Parameters
     ----------
     found : Summary
         What the rows say.
-    axes : sequence of str
-        Varied keys.
+    axes : mapping of str to str
+        Varied keys with the SI units of their values.
     """
-    numeric = [key for key in axes if _values(found, key).size > 1]
+    numeric = [(key, f"{key} [{unit}]") for key, unit in axes.items() if _values(found, key).size > 1]
     drawn = {}
     with mpl.rc_context(STYLE):
         if numeric:
-            drawn["errors"] = _curves(found, numeric[0])
+            drawn["errors"] = _curves(found, *numeric[0])
             if any(point.sight for points in found.points.values() for point in points):
-                drawn["sight"] = _sight(found, numeric[0])
+                drawn["sight"] = _sight(found, *numeric[0])
             if any(np.isfinite(point.gain[1]) for points in found.points.values() for point in points):
-                drawn["response"] = _response(found, numeric[0])
+                drawn["response"] = _response(found, *numeric[0])
         if len(numeric) > 1 and any(kind == "filter" for kind, _ in found.points):
-            drawn["map"] = _map(found, numeric[0], numeric[1])
+            drawn["map"] = _map(found, *numeric[0], *numeric[1])
     return drawn
 
 
@@ -70,7 +70,7 @@ def _rms(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _curves(found: Summary, key: str) -> Figure:
+def _curves(found: Summary, key: str, words: str) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, 4.8))
     axes = figure.subplots()
     handles: list[Line2D | Patch] = []
@@ -79,31 +79,22 @@ def _curves(found: Summary, key: str) -> Figure:
     for (kind, name), points in found.points.items():
         along = _along(points, key)
         x = [value for value, _ in along]
-        color, width = color_of(f"{_ROOMS[kind]}/{name}"), 0.9 if kind == "sensor" else 1.9
-        columns = [
-            [_rms([getattr(point, end) for point in group]) for _, group in along] for end in ("rmse", "lower", "upper")
+        ends = [
+            [_rms([getattr(point, end) for point in group]) for _, group in along] for end in ("lower", "rmse", "upper")
         ]
-        style = marked(marks[kind, name], color, len(x))
-        handles += axes.plot(x, columns[0], color=color, linewidth=width, label=label(name), **style)
-        if np.isfinite(columns[1]).all():
-            axes.fill_between(x, columns[1], columns[2], color=color, alpha=0.18, linewidth=0)
+        handles += _banded(axes, (kind, name), marks, x, ends, 0.9 if kind == "sensor" else 1.9)
         if kind == "filter":
             for bound in ("floor", "optimum"):
                 bounds.setdefault(bound, [_rms([getattr(point, bound) for point in group]) for _, group in along])
     for (bound, values), dash in zip(bounds.items(), (_DOTTED, (0, (4, 2))), strict=False):
         if np.isfinite(values).any():
             axes.plot(x, values, color=INK, linewidth=1.4, linestyle=dash)
-            words = {"floor": "noise floor", "optimum": "optimum of each case"}[bound]
-            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dash, label=words))
-    _scale(axes, key, x)
-    axes.set_yscale("log")
-    axes.set_ylabel("RMSE [deg/s]")
-    axes.grid(visible=True)
-    arrange(figure, handles)
-    return figure
+            called = {"floor": "noise floor", "optimum": "optimum of each case"}[bound]
+            handles.append(Line2D([], [], color=INK, linewidth=1.4, linestyle=dash, label=called))
+    return _finished(axes, words, x, "RMSE [deg/s]", handles)
 
 
-def _sight(found: Summary, key: str) -> Figure:
+def _sight(found: Summary, key: str, words: str) -> Figure:
     """Draw what each filter leaves of the line of sight, with its interval."""
     figure = Figure(figsize=(WIDTH_IN, 3.8))
     axes = figure.subplots()
@@ -115,14 +106,34 @@ def _sight(found: Summary, key: str) -> Figure:
             continue
         x = [value for value, _ in along]
         ends = [[_rms([point.sight[RESIDUAL][k] for point in group]) for _, group in along] for k in range(3)]
-        color = color_of(f"{_ROOMS[kind]}/{name}")
-        style = marked(marks[kind, name], color, len(x))
-        handles += axes.plot(x, ends[1], color=color, linewidth=1.9, label=label(name), **style)
-        if np.isfinite(ends[0]).all():
-            axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
-    _scale(axes, key, x)
+        handles += _banded(axes, (kind, name), marks, x, ends)
+    return _finished(axes, words, x, "residual [µrad]", handles)
+
+
+def _banded(
+    axes: Axes,
+    source: tuple[str, str],
+    marks: Mapping[tuple[str, str], Mark],
+    x: Sequence[float],
+    ends: Sequence[Sequence[float]],
+    width: float = 1.9,
+) -> list[Line2D]:
+    """Draw lower end, value and upper end of a source, and return its entry of the legend."""
+    kind, name = source
+    color = color_of(f"{_ROOMS[kind]}/{name}")
+    style = marked(marks[source], color, len(x))
+    if np.isfinite(ends[0]).all():
+        axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
+    return axes.plot(x, ends[1], color=color, linewidth=width, label=label(name), **style)
+
+
+def _finished(axes: Axes, words: str, x: Sequence[float], upright: str, handles: list[Line2D | Patch]) -> Figure:
+    """Return the figure of axes over a varied key, with scales, words and legend."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    _scale(axes, words, x)
     axes.set_yscale("log")
-    axes.set_ylabel("residual [µrad]")
+    axes.set_ylabel(upright)
     axes.grid(visible=True)
     arrange(figure, handles)
     return figure
@@ -135,7 +146,7 @@ def _marks(found: Summary) -> dict[tuple[str, str], Mark]:
     return {key: marks[group] for key, group in groups.items()}
 
 
-def _response(found: Summary, key: str) -> Figure:
+def _response(found: Summary, key: str, words: str) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, 5.6))
     panels = figure.subplots(2, 1, sharex=True)
     handles: list[Line2D | Patch] = []
@@ -143,25 +154,21 @@ def _response(found: Summary, key: str) -> Figure:
     for (kind, name), points in found.points.items():
         along = _along(points, key)
         x = [value for value, _ in along]
-        color = color_of(f"{_ROOMS[kind]}/{name}")
-        style = marked(marks[kind, name], color, len(x))
         for axes, part in zip(panels, ("gain", "phase"), strict=True):
             ends = [
                 [float(np.mean([getattr(point, part)[k] for point in group])) for _, group in along] for k in range(3)
             ]
-            lines = axes.plot(x, ends[1], color=color, linewidth=1.5, label=label(name), **style)
-            if np.isfinite(ends[0]).all():
-                axes.fill_between(x, ends[0], ends[2], color=color, alpha=0.18, linewidth=0)
+            lines = _banded(axes, (kind, name), marks, x, ends, 1.5)
         handles += lines
-    for axes, words in zip(panels, ("gain of the first line [-]", "its phase [deg]"), strict=True):
-        axes.set_ylabel(words)
+    for axes, upright in zip(panels, ("gain of the first line [-]", "its phase [deg]"), strict=True):
+        axes.set_ylabel(upright)
         axes.grid(visible=True)
-    _scale(panels[1], key, x)
+    _scale(panels[1], words, x)
     arrange(figure, handles)
     return figure
 
 
-def _map(found: Summary, first: str, second: str) -> Figure:
+def _map(found: Summary, first: str, words: str, second: str, upright: str) -> Figure:
     """Draw the RMSE of every filter over two axes, all in one scale."""
     names = [name for kind, name in found.points if kind == "filter"]
     x, y = _values(found, first), _values(found, second)
@@ -182,15 +189,15 @@ def _map(found: Summary, first: str, second: str) -> Figure:
         for axis, values in ((axes.xaxis, x), (axes.yaxis, y)):
             at = np.unique(np.linspace(0, values.size - 1, min(values.size, 5)).round().astype(int))
             axis.set_ticks(at, [f"{values[k]:.3g}" for k in at])
-        axes.set_xlabel(first, fontsize=7.5)
-    panels[0].set_ylabel(second, fontsize=7.5)
+        axes.set_xlabel(words, fontsize=7.5)
+    panels[0].set_ylabel(upright, fontsize=7.5)
     figure.colorbar(image, ax=list(panels), label="log10 of the RMSE in deg/s")
     return figure
 
 
-def _scale(axes: Axes, key: str, x: Sequence[float]) -> None:
+def _scale(axes: Axes, words: str, x: Sequence[float]) -> None:
     positive = min(x) > 0.0
     if positive and max(x) / min(x) >= _LOGARITHMIC:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel(f"{key} [SI]")
+    axes.set_xlabel(words)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from testbed.campaigns.curves import summarise
 from testbed.campaigns.figures import figures_of
+from testbed.campaigns.rows import unit_at
 from testbed.campaigns.store import read_cases
 from testbed.pages.template import render
 from testbed.runs.atomic import write_text
@@ -53,7 +54,7 @@ class Page:
         seeds = sum(point.n_seed for point in next(iter(found.points.values()), ()))
         text = render(
             "sweep.html.j2",
-            figures_of(found, study.axes),
+            figures_of(found, {key: unit_at(study.cases[0].scenario, key) for key in study.axes}),
             study=study,
             found=found,
             sights=list(dict.fromkeys(aimed)),

@@ -113,6 +113,25 @@ def in_si(scenario: Scenario, key: str, written: Any) -> float | str | None:
     return None if written is None else str(written)
 
 
+def unit_at(scenario: Scenario, key: str) -> str:
+    """Return the SI unit of the quantity at a dotted key of a scenario, a dash for a number without one.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any case.
+    key : str
+        Such as ``motion.0.sine.frequency``.
+    """
+    here: Any = scenario.resolved()
+    for step in key.split("."):
+        if isinstance(here, list):
+            here = here[int(step)] if step.isdigit() and int(step) < len(here) else None
+        else:
+            here = here.get(step) if isinstance(here, dict) else None
+    return here.partition(" ")[2] if isinstance(here, str) and " " in here else "-"
+
+
 def rows_of(case: Variation, seed: int, metrics: RunMetrics) -> list[dict[str, Any]]:
     """Return the rows of one case under one seed.
 

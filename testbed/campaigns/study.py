@@ -17,8 +17,8 @@ from testbed.campaigns.axes import Axis, jointly_drawn, values_of
 from testbed.document import Document
 from testbed.errors import Problem, ScenarioError, shortened
 from testbed.parts import Part
+from testbed.scenario.frame import Seed
 from testbed.scenario.loader import load_scenario
-from testbed.scenario.model import Seed
 from testbed.units import Quantity
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from testbed.runs.outputs import chosen
 from testbed.runs.results import MemoryStore
 from testbed.runs.size import disk_bytes, require_space
 from testbed.scenario.loader import as_scenario
+from testbed.signals import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -54,7 +55,8 @@ def run(
         What to write into that folder, of ``metrics``, ``netcdf``, ``recording``, ``report``; all if not given.
         Without ``netcdf`` the run has metrics only.
     block : float, optional
-        Length of a block [s], 20 000 samples of the base clock if not given; the signals do not depend on it.
+        Length of a block [s], 20 000 samples of the base clock if not given, 4 000 if it is shown `live`; the signals
+        do not depend on it.
     progress : callable, optional
         Called after every block with the simulated time [s].
     live : str, optional
@@ -89,6 +91,9 @@ def run(
             msg = "outputs: expected only beside out, the folder that they go to"
             raise ValueError(msg)
         return _run_in_memory(loaded, block, progress)
+    if live is not None and block is None:
+        # Whoever looks on sees one block late.
+        block = BLOCK / 5 / loaded.base_rate_hz
     return _run_to_folder(loaded, Path(out), chosen(outputs), block, progress, live)
 
 

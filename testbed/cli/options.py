@@ -28,6 +28,10 @@ PluginModules = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a recorded motion lie outside the scenario's folder.")
 ]
+WantedOutputs = Annotated[
+    str | None,
+    typer.Option("--outputs", metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
+]
 RunDir = Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Run folder.")]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from testbed.chain.runner import run
 from testbed.cli.terminal import print_metrics
 from testbed.errors import Problem, ScenarioError, quoted
-from testbed.scenario.model import MOST_SEED
+from testbed.scenario.frame import MOST_SEED
 
 if TYPE_CHECKING:
     from testbed.campaigns.study import Variation

@@ -12,7 +12,7 @@ from testbed.cli.console import terminal
 from testbed.cli.sights import print_sights
 from testbed.pages.numbers import bounded
 from testbed.pages.palette import color_of
-from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number, rate_text
+from testbed.runs.table import HEADINGS, NOTHING, error_cells, error_title, error_unit, number, rate_text, ratio_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -168,7 +168,7 @@ def _line_cells(source: SourceMetrics, shown: Sequence[float]) -> list[str]:
 def _line_cell(line: LineMetrics) -> str:
     if line.gain is None:
         return NOTHING
-    over = f", {line.error_deg_s / line.optimum_deg_s:.1f}" if line.error_deg_s and line.optimum_deg_s else ""
+    over = f", {ratio_text(line.error_deg_s / line.optimum_deg_s)}" if line.error_deg_s and line.optimum_deg_s else ""
     lost = line.phase_ci95_deg is not None and line.phase_ci95_deg >= 90.0
     phase = "phase lost" if lost else f"{bounded(line.phase_deg, line.phase_ci95_deg)} deg"
     return f"{bounded(line.gain, line.gain_ci95)}, {phase}{over}".replace("−", "-")

@@ -141,33 +141,6 @@ class Lssvm:
         return values
 
 
-def leave_one_out(X: FloatArray, y: FloatArray, gamma: float, width2: float) -> FloatArray:
-    r"""Return each row's error y_i - f(x_i) under the machine trained without it.
-
-    .. math:: r_i = a_i / M_{ii}, \quad M = A^{-1} - \eta \eta' / 1'\eta
-
-    Parameters
-    ----------
-    X, y, gamma, width2 : ndarray, shape (n_row, n_feature); ndarray, shape (n_row,); float
-        As for `Lssvm.fit`.
-
-    Returns
-    -------
-    ndarray, shape (n_row,)
-        Errors, unit of `y`.
-
-    References
-    ----------
-    Cawley and Talbot, "Fast exact leave-one-out cross-validation of sparse least-squares support vector machines",
-    Neural Networks 17 (2004).
-    """
-    system = _System(X, y, gamma, width2)
-    inverse = _root_inverse(system)
-    diagonal = np.einsum("ij,ij->j", inverse, inverse) - system.eta**2 / system.eta.sum()
-    residuals: FloatArray = system.weights / diagonal
-    return residuals
-
-
 def kernel_residuals(X: FloatArray, y: FloatArray, gamma: float, width2: float, blocks: Sequence[slice]) -> FloatArray:
     r"""Return each row's error under the machine trained without the block that holds it.
 

@@ -153,7 +153,7 @@ def compensate(
     Wang, Cui, Cao, Micromachines 14 (2023) 1712, sections 2 and 3.
     """
     chosen = PaperOptions() if options is None else options
-    rows = _decompose(record, chosen, seed, threads) if modes is None else modes
+    rows = decompose(record, chosen, seed, threads) if modes is None else modes
     if rows.ndim != 2 or rows.shape[1] != record.rate.size:
         msg = f"modes: expected shape (n_mode + 1, {record.rate.size}), got {rows.shape}"
         raise ValueError(msg)
@@ -166,6 +166,30 @@ def compensate(
     drift, search = _regress(record, signal, chosen, seed)
     sizes = (len(noise), len(mixed), len(slow))
     return PaperResult(filtered + signal - drift, drift, filtered, sizes, factor, ratio, search)
+
+
+def decompose(
+    record: GyroRecord, options: PaperOptions | None = None, seed: int = 0, threads: int | None = None
+) -> FloatArray:
+    """Return the modes that the pipeline begins with, the residual last [rad/s], shape (n_mode + 1, n_time).
+
+    Parameters
+    ----------
+    record : GyroRecord
+        To decompose.
+    options : PaperOptions, optional
+        Variant, trials and noise.
+    seed : int
+        Of the added noise.
+    threads : int, optional
+        All processors unless told.
+    """
+    from testbed.compensation.ceemdan import ceemdan
+
+    chosen = PaperOptions() if options is None else options
+    return ceemdan(
+        record.rate, variant=chosen.variant, trials=chosen.trials, noise=chosen.noise, seed=seed, threads=threads
+    )
 
 
 def corrected(record: GyroRecord) -> FloatArray:
@@ -182,14 +206,6 @@ def corrected(record: GyroRecord) -> FloatArray:
         Corrected rate [rad/s].
     """
     return compensate(record).rate
-
-
-def _decompose(record: GyroRecord, options: PaperOptions, seed: int, threads: int | None) -> FloatArray:
-    from testbed.compensation.ceemdan import ceemdan
-
-    return ceemdan(
-        record.rate, variant=options.variant, trials=options.trials, noise=options.noise, seed=seed, threads=threads
-    )
 
 
 def _group(modes: FloatArray, sample_rate_hz: float, options: PaperOptions) -> tuple[range, range, range]:

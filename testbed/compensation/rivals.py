@@ -65,7 +65,14 @@ def olmd_kpca(record: GyroRecord, *, seed: int = 0) -> FloatArray:
     return slow + mixed
 
 
-def ceemdan_lwt(record: GyroRecord, *, seed: int = 0, trials: int = 100, threads: int | None = None) -> FloatArray:
+def ceemdan_lwt(
+    record: GyroRecord,
+    *,
+    seed: int = 0,
+    trials: int = 100,
+    threads: int | None = None,
+    modes: FloatArray | None = None,
+) -> FloatArray:
     """CEEMDAN, noise and mixed modes each by the soft thresholds of a lifting wavelet.
 
     Parameters
@@ -78,14 +85,16 @@ def ceemdan_lwt(record: GyroRecord, *, seed: int = 0, trials: int = 100, threads
         Its realisations [-].
     threads : int, optional
         All processors unless told.
+    modes : ndarray, shape (n_mode + 1, n_time), optional
+        A decomposition made before, residual last [rad/s].
 
     Returns
     -------
     ndarray, shape (n_time,)
         Filtered rate [rad/s].
     """
-    modes = ceemdan(record.rate, seed=seed, trials=trials, threads=threads)
-    groups = group_modes(modes, record.sample_rate_hz)
-    fast = [lifting_threshold(modes[k]) for k in (*groups.noise, *groups.mixed)]
-    corrected: FloatArray = np.sum([*fast, *modes[list(groups.drift)]], axis=0)
+    rows = ceemdan(record.rate, seed=seed, trials=trials, threads=threads) if modes is None else modes
+    groups = group_modes(rows, record.sample_rate_hz)
+    fast = [lifting_threshold(rows[k]) for k in (*groups.noise, *groups.mixed)]
+    corrected: FloatArray = np.sum([*fast, *rows[list(groups.drift)]], axis=0)
     return corrected

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     Objective = Callable[[FloatArray], float]
     Box = Sequence[tuple[float, float]]
 
+# Points of evolution per coordinate, its generations after the first, and evaluations for the simplex behind it.
+_POPULATION, _GENERATIONS, _SIMPLEX = 8, 6, 60
+
 
 @dataclass(frozen=True)
 class Best:
@@ -116,17 +119,9 @@ def grey_wolf(
     return box.best
 
 
-def evolve(
-    objective: Objective,
-    bounds: Box,
-    *,
-    population: int = 8,
-    generations: int = 6,
-    simplex: int = 60,
-    seed: int = 0,
-    log: bool = False,
-) -> Best:
-    """Minimise by differential evolution, then by Nelder and Mead's simplex from its best point.
+def evolve(objective: Objective, bounds: Box, *, seed: int = 0, log: bool = False) -> Best:
+    """Minimise by differential evolution (8 points per coordinate, 6 generations after the first), then by Nelder and
+    Mead's simplex of at most 60 evaluations from its best point.
 
     Parameters
     ----------
@@ -134,12 +129,6 @@ def evolve(
         Of a point, ndarray of shape (n_dim,), to a float.
     bounds : sequence of (float, float)
         Of each coordinate.
-    population : int
-        Points per coordinate.
-    generations : int
-        After the first.
-    simplex : int
-        Evaluations for the simplex.
     seed : int
         Of the random numbers.
     log : bool
@@ -162,10 +151,10 @@ def evolve(
     box = _Counted(objective, bounds, log=log)
     limits = Bounds(box.low, box.high)
     found = differential_evolution(
-        box, limits, popsize=population, maxiter=generations, tol=0.0, polish=False, rng=np.random.default_rng(seed)
+        box, limits, popsize=_POPULATION, maxiter=_GENERATIONS, tol=0.0, polish=False, rng=np.random.default_rng(seed)
     )
     # In logarithms a hundredth is 2 %, far below what a cross-validation can tell.
     minimize(
-        box, found.x, method="Nelder-Mead", bounds=limits, options={"maxfev": simplex, "xatol": 0.01, "fatol": 0.0}
+        box, found.x, method="Nelder-Mead", bounds=limits, options={"maxfev": _SIMPLEX, "xatol": 0.01, "fatol": 0.0}
     )
     return box.best

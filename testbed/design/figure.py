@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis
+from testbed.pages.axes import WIDTH_IN, arrange
+from testbed.pages.decades import decade_axis
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
     from testbed.design.search import Design
 
-_GOOD, _OTHER, _FRONT = "#1a7f4b", "#8a8a8a", "#1f5fa8"
+_FRONT = "#1f5fa8"
+# Whether a candidate is enough is told by more than the colour.
+_ENOUGH: dict[str, Any] = {"color": "#1a7f4b", "marker": "o", "linestyle": "none", "markersize": 5.5}
+_NOT_ENOUGH: dict[str, Any] = {**_ENOUGH, "color": "#8a8a8a", "marker": "x", "markeredgewidth": 1.3}
 
 
 def pareto_figure(design: Design, metric: str, limit: float, words: str) -> Figure:
@@ -41,9 +45,9 @@ def pareto_figure(design: Design, metric: str, limit: float, words: str) -> Figu
         figure = Figure(figsize=(WIDTH_IN, 4.6))
         axes = figure.subplots()
         axes.set_yscale("log")
-        for met, color in ((False, _OTHER), (True, _GOOD)):
+        for met, look in ((False, _NOT_ENOUGH), (True, _ENOUGH)):
             some = [one for one in design.candidates if one.met == met]
-            axes.plot([one.cost for one in some], [one.values[metric] for one in some], "o", color=color, markersize=5)
+            axes.plot([one.cost for one in some], [one.values[metric] for one in some], **look)
         axes.step(
             [one.cost for one in front],
             [one.values[metric] for one in front],
@@ -54,19 +58,18 @@ def pareto_figure(design: Design, metric: str, limit: float, words: str) -> Figu
         axes.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (5, 2)))
         if (chosen := design.chosen) is not None:
             place = chosen.cost, chosen.values[metric]
-            axes.plot(*place, "o", markersize=12, markerfacecolor="none", markeredgecolor=_FRONT, markeredgewidth=1.6)
+            axes.plot(*place, "o", color=_FRONT, markersize=12, fillstyle="none", markeredgewidth=1.6)
             axes.annotate(chosen.name, place, xytext=(-11, -3), textcoords="offset points", ha="right", va="top")
         axes.set_xlabel("cost")
         axes.set_ylabel(f"{words} [µrad]")
         axes.margins(x=0.08, y=0.16)
         decade_axis(axes)
         axes.grid(visible=True)
-        dot = {"marker": "o", "linestyle": "none", "markersize": 5}
         arrange(
             figure,
             [
-                Line2D([], [], color=_GOOD, label="is enough", **dot),  # type: ignore[arg-type]
-                Line2D([], [], color=_OTHER, label="is not", **dot),  # type: ignore[arg-type]
+                Line2D([], [], label="is enough", **_ENOUGH),
+                Line2D([], [], label="is not", **_NOT_ENOUGH),
                 Line2D([], [], color=_FRONT, linewidth=1.4, label="none cheaper is as good"),
                 Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (5, 2)), label="asked"),
             ],

@@ -14,7 +14,7 @@ from testbed.campaigns.study import load_study
 from testbed.design.search import chosen_scenario
 from testbed.fusion.belief_file import is_belief_file
 from testbed.runs.table import metric_text
-from testbed.scenario.model import dump, resolved_fusion
+from testbed.scenario.resolved import dump, resolved_fusion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document
-from testbed.errors import quoted
+from testbed.errors import ScenarioError, quoted
 from testbed.inputs.plugins import load_plugins
 from testbed.inputs.tree import Tree, read_yaml
 from testbed.pointing.parameters import Mirror, Tracker, Window, window_key
+from testbed.scenario.entries import mapping
 from testbed.scenario.intake import Intake
 from testbed.scenario.loader import read_bound, read_document
 from testbed.units import parse
@@ -100,22 +101,29 @@ def read_requirement(path: str | Path, *, plugins: Iterable[str] = ()) -> Requir
         if tracker.fades:
             words = "expected none: a spectrum knows no moments; give them to the chosen scenario"
             document.find(("trackers", name, "fades"), words)
-    document.refuse()
     written["frame"] = {"turntable": {"mode": "ideal"}, **data}
     whole = {**written["frame"], "sensors": written["sensors"], "fusion": written["fusion"]}
-    inner = Document(path, _WHAT, Tree(whole, tree.lines))
-    scenario = read_document(Intake(inner, folder, load_plugins(plugins)))
-    found = Requirement(scenario, trackers, mirrors, bounds, costs, written)
-    _check_windows(found, document)
+    scenario = _scenario(document, Tree(whole, tree.lines), folder, plugins)
+    if scenario is not None:
+        _check_windows(scenario, bounds, document)
     document.refuse()
-    return found
+    assert scenario is not None
+    return Requirement(scenario, trackers, mirrors, bounds, costs, written)
 
 
-def _check_windows(found: Requirement, document: Document) -> None:
+def _scenario(document: Document, tree: Tree, folder: Path, plugins: Iterable[str]) -> Scenario | None:
+    """Return the scenario in a requirement; None, with its findings among the others, if something is wrong."""
+    try:
+        return read_document(Intake(Document(document.file, _WHAT, tree), folder, load_plugins(plugins)))
+    except ScenarioError as error:
+        document.adopt(error)
+        return None
+
+
+def _check_windows(scenario: Scenario, bounds: tuple[Bound, ...], document: Document) -> None:
     """Note windows that do not fit into what is judged, at the bound that asks for them."""
-    frame = found.scenario.frame
-    judged = frame.duration - frame.settle
-    for bound in found.bounds:
+    judged = scenario.frame.duration - scenario.frame.settle
+    for bound in bounds:
         metric, _, length = bound.metric.partition(".")
         if length and float(length) > judged:
             document.find((metric,), f"expected windows within the {judged:g} s after settle, got {float(length):g} s")
@@ -123,9 +131,12 @@ def _check_windows(found: Requirement, document: Document) -> None:
 
 def _bounds(document: Document, asked: Mapping[str, Any]) -> tuple[Bound, ...]:
     found = []
-    for metric, entry in asked.items():
-        windows = _mapping(document, metric, entry) if metric in _WINDOWED else {"": entry}
-        for window, text in windows.items():
+    windows = {
+        metric: mapping(document, entry, (metric,)) if metric in _WINDOWED else {"": entry}
+        for metric, entry in asked.items()
+    }
+    for metric, entries in windows.items():
+        for window, text in entries.items():
             place = (metric, window) if window else (metric,)
             try:
                 bound = read_bound("", _named(metric, str(window)), text)
@@ -134,7 +145,7 @@ def _bounds(document: Document, asked: Mapping[str, Any]) -> tuple[Bound, ...]:
                 found.append(bound)
             except ValueError as error:
                 document.find(place, str(error) or f"expected a bound such as '< 0.5', got {quoted(text)}")
-    if not asked:
+    if not any(windows.values()):
         document.find((), f"nothing is asked: give a bound such as rpe_urad: {{100 ms: '< 0.5'}} ({', '.join(_ASKED)})")
     return tuple(found)
 
@@ -144,31 +155,26 @@ def _named(metric: str, window: str) -> str:
     return f"{metric}.{window_key(parse(window, 's', example='100 ms'))}" if window else metric
 
 
-def _mapping(document: Document, kind: str, given: Any) -> dict[str, Any]:
-    if isinstance(given, dict):
-        return given
-    document.find((kind,), f"expected a mapping, got {quoted(given)}")
-    return {}
-
-
-def _without_costs(
-    document: Document, kind: str, given: Any, costs: dict[tuple[str, str], float]
-) -> dict[str, dict[str, Any]]:
-    """Return the parts of a kind without their costs, which are noted."""
-    parts = {}
-    for name, entry in _mapping(document, kind, {} if given is None else given).items():
-        part = dict(_mapping(document, f"{kind}.{name}", {} if entry is None else entry))
-        cost = part.pop(_COST, 0.0)
+def _without_costs(document: Document, kind: str, given: Any, costs: dict[tuple[str, str], float]) -> dict[str, Any]:
+    """Return the parts of a kind without their costs, which are noted; what is no mapping is for its own reader."""
+    parts: dict[str, Any] = {}
+    for name, entry in ((str(name), entry) for name, entry in mapping(document, given, (kind,)).items()):
+        parts[name], cost = entry, 0.0
+        if isinstance(entry, dict):
+            parts[name] = {key: value for key, value in entry.items() if key != _COST}
+            cost = entry.get(_COST, 0.0)
         if isinstance(cost, bool) or not isinstance(cost, int | float) or not cost >= 0.0:
             document.find((kind, name, _COST), f"expected a number of at least 0, got {quoted(cost)}")
             cost = 0.0
-        costs[kind, str(name)] = float(cost)
-        parts[str(name)] = part
-    if not parts:
+        costs[kind, name] = float(cost)
+    if given is None or given == {}:
         document.find((kind,), f"there is nothing to choose from: name at least one of '{kind}:'")
     return parts
 
 
 def _parts(document: Document, model: type[Part], kind: str, given: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    read = {name: document.validate(model, entry, (kind, name), folder) for name, entry in given.items()}
+    read = {
+        name: document.validate(model, mapping(document, entry, (kind, name)), (kind, name), folder)
+        for name, entry in given.items()
+    }
     return {name: part for name, part in read.items() if part is not None}

@@ -5,15 +5,13 @@ calibrated.
 from __future__ import annotations
 
 import functools
-from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import model_validator
 
-from testbed.errors import UnknownNameError
 from testbed.fusion.model_filter import Variance
-from testbed.parts import Part
+from testbed.parts import Part, read_shipped
 from testbed.units import Duration
 
 if TYPE_CHECKING:
@@ -49,14 +47,7 @@ class Bands(Part):
 
 @functools.cache
 def _shipped(name: str) -> dict[str, Bands]:
-    from ruamel.yaml import YAML
-
-    folder = resources.files("testbed.fusion") / "bands"
-    names = [entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")]
-    if name not in names:
-        kind = "set of bands"
-        raise UnknownNameError(kind, name, names)
-    content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
+    content = read_shipped("set of bands", "testbed.fusion", "bands", name)
     return {key: Bands.model_validate(value, context={"border": True}) for key, value in content.items()}
 
 

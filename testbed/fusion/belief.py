@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from testbed.errors import UnknownNameError
 from testbed.fusion.realisation import Realisation, realise
-from testbed.parts import Part
+from testbed.parts import Part, read_shipped
 from testbed.signals import transfer
 from testbed.units import DelayTime, Frequency, Range, Rate, RateDensity, RateRandomWalk, RateStd
 
@@ -198,14 +196,7 @@ class SensorBelief(Part):
 
 @functools.cache
 def _shipped(name: str) -> dict[str, SensorBelief]:
-    from ruamel.yaml import YAML
-
-    folder = resources.files("testbed.fusion") / "beliefs"
-    names = [entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")]
-    if name not in names:
-        kind = "belief"
-        raise UnknownNameError(kind, name, names)
-    content = YAML(typ="safe", pure=True).load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
+    content = read_shipped("belief", "testbed.fusion", "beliefs", name)
     return {
         key: SensorBelief.model_validate({**value, "source": name}, context={"border": True})
         for key, value in content.items()

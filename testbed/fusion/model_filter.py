@@ -61,6 +61,34 @@ class FilterParameters(CommonParameters):
     use_input_noise: bool = True
     coloured: Switch = False
 
+    def build(self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], q: float) -> FusionModel:
+        """Return the model of signal and sensors, stamped on any clocks.
+
+        Parameters
+        ----------
+        belief : mapping of str to SensorBelief
+            What is believed about each sensor.
+        sample_rate_hz : mapping of str to float
+            Rate of each sensor [Hz].
+        q : float
+            Density of the signal's noise, such as the parameter of that name.
+
+        Raises
+        ------
+        ValueError
+            As for `build_model`.
+        """
+        return build_model(
+            belief,
+            sample_rate_hz,
+            order=self.order,
+            q=q,
+            use_input_noise=self.use_input_noise,
+            coloured=self.coloured,
+            start=self.start,
+            any_ratio=True,
+        )
+
     @field_validator("q", mode="before")
     @classmethod
     def _read_q(cls, value: Any, info: ValidationInfo) -> float:
@@ -145,16 +173,7 @@ class ModelFilter(BlockFilter):
         super().__init__(belief, sample_rate_hz, parameters)
         form = parameters.form if isinstance(parameters, FormParameters) else "joseph"
         precision = parameters.precision if isinstance(parameters, CovarianceParameters) else "double"
-        self.model: FusionModel = build_model(
-            belief,
-            sample_rate_hz,
-            order=parameters.order,
-            q=parameters.q,
-            use_input_noise=parameters.use_input_noise,
-            coloured=parameters.coloured,
-            start=parameters.start,
-            any_ratio=True,
-        )
+        self.model: FusionModel = parameters.build(belief, sample_rate_hz, parameters.q)
         self._nodes: tuple[FloatArray, ...] | None = None
         self._form = FORMS[form]
         kind = np.float32 if precision == "single" else np.float64

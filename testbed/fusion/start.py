@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 StartKind = Literal["unknown", "rest"]
 
-# More is neither needed, since readings soon outweigh it (`benchmarks/bench_starts.py` starts inside 200 deg/s), nor
-# harmless: with 289 deg/s, an even spread over 500 deg/s, P loses a factor of 200 more of its digits.
+# More is neither needed, since readings soon outweigh it (a record may begin inside 200 deg/s), nor harmless: with 289
+# deg/s, an even spread over 500 deg/s, P loses a factor of 200 more of its digits.
 _CONSTANT_STD = math.radians(20.0)
 # A rest is known to this [rad/s], below what any of the sensors tells in hours; a claim of 0 would be no claim.
 REST_STD = math.radians(1e-5)

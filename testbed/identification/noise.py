@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from testbed.identification.local import fit_local
+from testbed.identification.local import LocalFit, fit_local
 from testbed.identification.matching import OutputClock, common_grid
-from testbed.identification.response import NoiseFloor
+from testbed.identification.response import NoiseFloor, chance_limit
 from testbed.identification.spectrum import Series, spectrum
 from testbed.identification.windows import spectrum_parts
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # An output noise this much below the input noise keeps R positive and changes nothing.
 _LEAST_OUTPUT = 3e-4
 _ROUNDS = 50
+# Values whose middle one is about the density there, to begin with.
+_NEIGHBOURS = 9
 
 
 class Heard(NamedTuple):
@@ -43,18 +45,16 @@ class Heard(NamedTuple):
 
 
 class ThreeFloors(NamedTuple):
-    """Noise of a reference and of two outputs [rad^2/s], and how many standard deviations the reference's is above
-    zero.
-    """
+    """Noise of a reference and of two outputs [rad^2/s], and how many standard deviations each is above zero."""
 
     reference: NoiseFloor
     first: NoiseFloor
     second: NoiseFloor
-    evidence: float
+    evidence: tuple[float, float, float]
 
 
 def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
-    """Return the noise of the reference and of both outputs, each its own.
+    r"""Return the noise of the reference and of both outputs, each its own.
 
     Parameters
     ----------
@@ -66,7 +66,9 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
     Returns
     -------
     ThreeFloors
-        Estimates may fall below zero where a noise is much the smallest.
+        Estimates may fall below zero where a noise is much the smallest. The evidence takes the standard deviation that
+        they have where that noise is none, :math:`|G_i|^2 / |G_1 G_2| \sqrt{\langle |r_1|^2 \rangle \langle |r_2|^2
+        \rangle / 2 \nu}`, nu the degrees of freedom and G of the reference 1.
     """
     grid = common_grid(reference, [(one.series, one.clock.error) for one in (first, second)])
     freq, X = grid.freq_hz, spectrum(reference, grid)[0]
@@ -75,17 +77,24 @@ def three_floors(reference: Series, first: Heard, second: Heard) -> ThreeFloors:
     for one in (first, second):
         Y, Z = (np.exp(2j * np.pi * freq * one.lag) * part for part in spectrum(one.series, grid, one.clock.error))
         both.append([fit_local(part, freq, X, Y, Z) for part in parts])
-    levels, evidence = [], []
-    for a, b in zip(*both, strict=True):
-        gains = a.response * np.conj(b.response)
-        of_reference = float((np.vdot(b.rest, a.rest) / a.freedom / gains).real)
-        levels.append([of_reference, *(one.noise - abs(one.response) ** 2 * of_reference for one in (a, b))])
-        evidence.append(of_reference * abs(gains) / np.sqrt(a.noise * b.noise / (2.0 * a.freedom)))
-    middle, freedom = (
-        np.array([getattr(one, name) for one in both[0]], dtype=float) for name in ("noise_hz", "freedom")
-    )
-    own, a_floor, b_floor = (NoiseFloor(middle, row / grid.length, freedom) for row in np.array(levels).T)
-    return ThreeFloors(own, a_floor, b_floor, float(np.sum(evidence) / np.sqrt(len(evidence))))
+    limit = chance_limit(len(parts))
+    pairs = [(one, other) for one, other in zip(*both, strict=True) if max(one.chance, other.chance) < limit]
+    told = np.array([_told(*pair) for pair in pairs]).reshape(-1, 2, 3)
+    freq_hz, freedom = np.array([(one.noise_hz, one.freedom) for one, _ in pairs], dtype=float).reshape(-1, 2).T
+    own, of_first, of_second = (NoiseFloor(freq_hz, level / grid.length, freedom) for level in told[:, 0].T)
+    sure = told[:, 1].sum(axis=0) / np.sqrt(max(len(pairs), 1))
+    return ThreeFloors(own, of_first, of_second, (float(sure[0]), float(sure[1]), float(sure[2])))
+
+
+def _told(first: LocalFit, second: LocalFit) -> tuple[FloatArray, FloatArray]:
+    """Return what a part says of the noise of reference, first and second, and over its standard deviation, shapes
+    (3,), (3,).
+    """
+    gains = first.response * np.conj(second.response)
+    powers = np.array([1.0, abs(first.response) ** 2, abs(second.response) ** 2])
+    common = float((np.vdot(second.rest, first.rest) / first.freedom / gains).real)
+    level = powers * common * [1.0, -1.0, -1.0] + [0.0, first.noise, second.noise]
+    return level, level * abs(gains) / powers / np.sqrt(first.noise * second.noise / (2.0 * first.freedom))
 
 
 class NoiseFit(NamedTuple):
@@ -117,16 +126,16 @@ def fit_noise(floor: NoiseFloor, gain: FloatArray, *, slow_before: bool) -> Nois
     Parameters
     ----------
     floor : NoiseFloor
-        Of the reading; densities at or below zero are left out.
+        Of the reading. Densities below zero, as one of three sensors may have, count like all others: without them
+        what is left would be too loud.
     gain : ndarray, shape (n_freq,)
         |G| at its frequencies [-].
     slow_before : bool
         Whether the 1/f noise passes the dynamics, as a bias does: |G|^2 c / f.
     """
-    known = floor.density > 0.0
-    freq, density, power = floor.freq_hz[known], floor.density[known], gain[known] ** 2
-    terms = np.stack([power, np.ones(density.size), (power if slow_before else 1.0) / freq], axis=1)
-    a, b, c = _likeliest(terms, density, floor.freedom[known])
+    freq, power = floor.freq_hz, gain**2
+    terms = np.stack([power, np.ones(freq.size), (power if slow_before else 1.0) / freq], axis=1)
+    a, b, c = _likeliest(terms, floor.density, floor.freedom)
     if slow_before:
         outer = max(float(np.sqrt(b)), _LEAST_OUTPUT * float(np.sqrt(max(a, c / float(freq.max())))))
         return NoiseFit(float(np.sqrt(a)), outer, None, float(np.sqrt(2.0 * np.pi * c)))
@@ -137,15 +146,16 @@ def fit_noise(floor: NoiseFloor, gain: FloatArray, *, slow_before: bool) -> Nois
 
 def _likeliest(terms: FloatArray, density: FloatArray, freedom: FloatArray) -> FloatArray:
     """Return the levels of the terms, shape (n_term,), none below zero, that make densities the likeliest."""
+    from scipy.ndimage import median_filter
     from scipy.optimize import nnls
 
-    believed, level = density, np.zeros(terms.shape[1])
+    believed, level = median_filter(np.abs(density), _NEIGHBOURS, mode="nearest"), np.zeros(terms.shape[1])
     for _ in range(_ROUNDS):
         weight = np.sqrt(freedom) / believed
         rows = terms * weight[:, None]
         size = np.linalg.norm(rows, axis=0)
         before, level = level, nnls(rows / size, weight * density)[0] / size
         believed = terms @ level
-        if np.allclose(level, before, rtol=1e-6, atol=0.0):
+        if not level.any() or np.allclose(level, before, rtol=1e-6, atol=0.0):
             break
     return level

@@ -96,6 +96,12 @@ class NoiseFloor:
     density: FloatArray
     freedom: FloatArray
 
+    def joined(self, other: NoiseFloor) -> NoiseFloor:
+        """Return the values of both."""
+        rows = [np.stack([one.freq_hz, one.density, one.freedom]) for one in (self, other)]
+        both = np.concatenate(rows, axis=1)
+        return NoiseFloor(*both[:, np.argsort(both[0], kind="stable")])
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -105,8 +111,8 @@ class Measured:
     ----------
     response : FrequencyResponse
         Where the output follows; no frequency if it does so nowhere.
-    noise : NoiseFloor
-        Of the output.
+    followed, quiet : NoiseFloor
+        Of the output: where it follows, with the noise that the reference has there; and where it does not, its own.
     lag : float
         Delay that was taken off before the fits [s].
     unfollowed, mains : tuple of float
@@ -115,10 +121,16 @@ class Measured:
     """
 
     response: FrequencyResponse
-    noise: NoiseFloor
+    followed: NoiseFloor
+    quiet: NoiseFloor
     lag: float
     unfollowed: tuple[float, ...]
     mains: tuple[float, ...]
+
+    @property
+    def noise(self) -> NoiseFloor:
+        """Noise of the output at all frequencies."""
+        return self.followed.joined(self.quiet)
 
 
 def measure_response(reference: Series, output: Series, *, one_clock: bool = False) -> Measured:
@@ -137,12 +149,27 @@ def measure_response(reference: Series, output: Series, *, one_clock: bool = Fal
         If they have too little time in common.
     """
     found = match(reference, output, one_clock=one_clock)
-    limit = np.log(_CHANCE / (_TRIALS * max(len(found.fits), 1)))
+    limit = chance_limit(len(found.fits))
     follows = [one for one in found.fits if one.chance < limit]
     mains = _mains(follows, found.grid)
     used = [one for one in follows if one.freq_hz not in mains]
     unfollowed = [one.freq_hz for one in found.fits if one.is_line and one.chance >= limit]
-    return Measured(_response(used, found), _floor(found, limit), found.lag, tuple(unfollowed), tuple(mains))
+    others = [(one.noise_hz, one.power, one.freedom) for one in found.fits if one.chance >= limit]
+    others += [(one.noise_hz, one.noise, one.freedom) for one in found.quiet]
+    return Measured(
+        _response(used, found),
+        _floor([(one.noise_hz, one.noise, one.freedom) for one in follows], found.grid.length),
+        # All is noise where nothing follows.
+        _floor(others, found.grid.length),
+        found.lag,
+        tuple(unfollowed),
+        tuple(mains),
+    )
+
+
+def chance_limit(n_part: int) -> float:
+    """Return the logarithm of the chance below which an output follows the reference in one of so many parts."""
+    return float(np.log(_CHANCE / (_TRIALS * max(n_part, 1))))
 
 
 def _response(used: list[LocalFit], found: Matched) -> FrequencyResponse:
@@ -160,12 +187,10 @@ def _response(used: list[LocalFit], found: Matched) -> FrequencyResponse:
     )
 
 
-def _floor(found: Matched, limit: float) -> NoiseFloor:
-    """Return the noise: what does not follow, all where nothing does, and what there is between the parts."""
-    levels = [(one.noise_hz, one.noise if one.chance < limit else one.power, one.freedom) for one in found.fits]
-    levels += [(one.noise_hz, one.noise, one.freedom) for one in found.quiet]
+def _floor(levels: list[tuple[float, float, int]], length: float) -> NoiseFloor:
+    """Return the noise of frequencies, levels and degrees of freedom, in the order of frequency."""
     freq, level, freedom = np.array(sorted(levels), dtype=float).reshape(-1, 3).T
-    return NoiseFloor(freq, level / found.grid.length, freedom)
+    return NoiseFloor(freq, level / length, freedom)
 
 
 # Lines off the mains' frequencies from which on those at them are excitation too; how far the mains wander.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from testbed.fusion.belief import SensorBelief
     from testbed.identification.channels import Prepared
+    from testbed.identification.noise import ThreeFloors
     from testbed.identification.response import NoiseFloor
     from testbed.logs.channel import Log, LogChannel
 
@@ -142,18 +143,38 @@ def identify_channels(
     ]
 
 
-def _floors(inner: Prepared, prepared: Sequence[Prepared], measured: Sequence[Measured]) -> list[NoiseFloor]:
+class _Floor(NamedTuple):
+    """Noise of an output, and what is to be said of it."""
+
+    noise: NoiseFloor
+    notes: tuple[str, ...] = ()
+
+
+def _floors(inner: Prepared, prepared: Sequence[Prepared], measured: Sequence[Measured]) -> list[_Floor]:
     """Return the noise of each output, by itself where another one tells it from the reference's."""
     if len(prepared) == 1:
-        return [measured[0].noise]
+        return [_Floor(measured[0].noise)]
     heard = [Heard(one.series, found.response.clock, found.lag) for one, found in zip(prepared, measured, strict=True)]
     three = [three_floors(inner.series, heard[i], heard[i - 1]) for i in range(len(heard))]
-    # Where the reference shows no noise, taking off what is none would only add to the scatter.
-    return [one.first if one.evidence > _TELLS else found.noise for one, found in zip(three, measured, strict=True)]
+    return [_told(one, found) for one, found in zip(three, measured, strict=True)]
+
+
+def _told(three: ThreeFloors, found: Measured) -> _Floor:
+    """Return the noise of the first output: its own alone where it follows a reference that shows noise, if it does."""
+    reference, own, _ = three.evidence
+    if reference <= _TELLS:
+        # Taking off what is none would only add to the scatter.
+        return _Floor(found.noise)
+    if own > _TELLS:
+        return _Floor(three.first.joined(found.quiet))
+    said = "its own noise is too small beside that of the reference to be told where it follows"
+    if not found.quiet.freq_hz.size:
+        return _Floor(found.noise, (f"{said}: the belief has both",))
+    return _Floor(found.quiet, (f"{said}: the belief has that of the other frequencies",))
 
 
 def _identified(
-    channel: LogChannel, prepared: Prepared, measured: Measured, floor: NoiseFloor, inner: Prepared
+    channel: LogChannel, prepared: Prepared, measured: Measured, floor: _Floor, inner: Prepared
 ) -> Identification:
     if measured.response.freq_hz.size < 2:
         raise refusal_of(
@@ -165,7 +186,7 @@ def _identified(
         words = f"no model can be fitted to its response ({error}); a reading may be damaged, or the record too short"
         raise refusal_of(channel, channel, words) from error
     sees_constant = bool(model.numerator[-1] != 0.0)
-    noise = fit_noise(floor, np.abs(model.response(floor.freq_hz)), slow_before=sees_constant)
+    noise = fit_noise(floor.noise, np.abs(model.response(floor.noise.freq_hz)), slow_before=sees_constant)
     try:
         belief = _belief(channel, model, noise, _bias(prepared, inner, model, measured))
     except ValidationError as error:
@@ -173,9 +194,9 @@ def _identified(
         key = ".".join(map(str, found["loc"])) or "response"
         words = f"its readings make no belief, {key}: {found['msg']}; a reading may be damaged"
         raise refusal_of(channel, channel, words) from error
-    notes = (*inner.notes, *prepared.notes, *_left_out(model, measured))
+    notes = (*inner.notes, *prepared.notes, *floor.notes, *_left_out(model, measured))
     name = channel.name.removeprefix("sensors/").removesuffix("/rate")  # of a run's file
-    return Identification(name, measured, model, floor, noise, belief, tuple(dict.fromkeys(notes)))
+    return Identification(name, measured, model, floor.noise, noise, belief, tuple(dict.fromkeys(notes)))
 
 
 def _bias(prepared: Prepared, inner: Prepared, model: SensorModel, measured: Measured) -> float:

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 # Where the first band of a budget begins, as the integral of the floor does.
 _LOWEST_HZ = 1e-6
 _BLIND = 1e30
+# Logarithm of the lowest frequency at which two sensors are compared [Hz].
+_LOWEST_CROSSOVER = -5.0
 
 
 def crossovers(
     first: Callable[[FloatArray], FloatArray],
     second: Callable[[FloatArray], FloatArray],
-    *,
-    low_hz: float = 1e-5,
     high_hz: float = 1e3,
 ) -> FloatArray:
     """Return the frequencies [Hz] at which two sensors are equally good, shape (n_crossing,), rising; to 1e-4 of
@@ -31,10 +31,10 @@ def crossovers(
     ----------
     first, second : callable
         Input-referred two-sided noise density, Hz -> rad^2/s.
-    low_hz, high_hz : float, optional
-        Where to look [Hz].
+    high_hz : float, optional
+        Up to where to look, from 1e-5 Hz on [Hz].
     """
-    freq = np.logspace(np.log10(low_hz), np.log10(high_hz), 4001)
+    freq = np.logspace(_LOWEST_CROSSOVER, np.log10(high_hz), 4001)
     # Where a sensor is blind its density is infinite.
     ratio = np.log(np.fmin(first(freq), _BLIND) / np.fmin(second(freq), _BLIND))
     (at,) = np.nonzero(np.sign(ratio[1:]) != np.sign(ratio[:-1]))
@@ -117,7 +117,7 @@ def _all_crossovers(psds: Mapping[str, Callable[[FloatArray], FloatArray]], band
     """Return where the best sensor changes [Hz]: crossings of two of which no third is better."""
     found = []
     for first, second in combinations(psds, 2):
-        for freq in crossovers(psds[first], psds[second], high_hz=bandwidth_hz):
+        for freq in crossovers(psds[first], psds[second], bandwidth_hz):
             here = {name: float(psd(np.array([freq]))[0]) for name, psd in psds.items()}
             if here[first] <= 1.01 * min(here.values()):
                 found.append(float(freq))

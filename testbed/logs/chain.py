@@ -41,8 +41,7 @@ class FileChain:
         self.path: Path = tables[0].path
         self.format = f"{tables[0].format}; {len(tables)} files"
         self.columns: Sequence[TableColumn] = [
-            replace(column, about=sum(table.columns[i].n_time or table.columns[i].about or 0 for table in tables))
-            for i, column in enumerate(tables[0].columns)
+            _joined([table.columns[i] for table in tables]) for i in range(len(names))
         ]
         self.header: Mapping[str, str] = tables[0].header
         self._n_first: int | None = None
@@ -64,3 +63,10 @@ class FileChain:
     def line(self, row: int) -> int | None:
         """Return the line of a row of the first file; the others' have none under its name."""
         return self._tables[0].line(row) if self._n_first is None or row < self._n_first else None
+
+
+def _joined(parts: Sequence[TableColumn]) -> TableColumn:
+    """Return a column of several files, as long as all together."""
+    known = [one.n_time for one in parts if one.n_time is not None]
+    about = sum(one.n_time or one.about or 0 for one in parts)
+    return replace(parts[0], n_time=sum(known) if len(known) == len(parts) else None, about=about)

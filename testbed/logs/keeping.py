@@ -13,7 +13,7 @@ from testbed.logs.means import Means, Places
 from testbed.logs.options import refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 # Numbers that are kept at most: 1 GB of them, and what is made of them takes as much several times over.
 MOST_KEPT = 1 << 27
 _GOOD_AVERAGE = 1000
+# Lines are counted in the first megabyte of a text: of so many there may be this share.
+_SURE = 0.5
 # Samples that are kept one by one unless more are asked for, and means that are kept of more: 500 MB with all that is
 # made of them.
 MOST_WHOLE = 1 << 23
@@ -74,8 +76,7 @@ def kept_columns(
     stamps = {one.stamps for one in plans if one.stamps is not None}
     n_time = 0
     # What the file itself says is refused before it is read.
-    said = sum(table.columns[i].n_time or 0 for i in {one.value for one in plans} | stamps)
-    if plans[0].average == 1 and said > MOST_KEPT:
+    if plans[0].average == 1 and _said(table, {one.value for one in plans} | stamps) > MOST_KEPT:
         raise _too_many(table)
     for block in table.blocks(list(dict.fromkeys([*(one.value for one in plans), *stamps])), stamps):
         n_time += next(iter(block.values())).size
@@ -89,6 +90,12 @@ def kept_columns(
     if not n_time:
         raise refusal(table.path, "expected at least 4 samples, got 0")
     return kept.result()
+
+
+def _said(table: Table, wanted: Collection[int]) -> float:
+    """Return how many numbers columns hold at the least, as far as the file says."""
+    columns = [table.columns[i] for i in wanted]
+    return sum(max(one.n_time or 0, _SURE * (one.about or 0)) for one in columns)
 
 
 def _too_many(table: Table) -> ScenarioError:

@@ -177,10 +177,7 @@ def stamp_scans(plans: Sequence[Plan]) -> dict[Timed, StampScan]:
 def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, clock: TimeBase | None) -> LogChannel:
     table = one.table
     numbers = values.astype(np.float64) if values.dtype.kind != "f" or values.dtype.itemsize != 8 else values
-    if np.isinf(numbers).any():
-        row = int(np.argmax(np.isinf(numbers)))
-        message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
-        raise refusal(table.path, message, line=table.line(row * one.average))
+    _refuse_infinite(one, numbers)
     notes = [*one.contradictions, *table.notes]
     if clock is not None and not one.time_said:
         notes += _contradiction(one, clock)
@@ -192,14 +189,7 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
     if stamps is not None and clock is not None and is_sparse(numbers):
         table, numbers, stamps, clock = _own_rows(table, numbers, stamps, clock)
         notes.append(f"{one.label} has a value in fewer than half of the rows: the others are left out")
-    if one.average > 1 and numbers.size < FEWEST:
-        message = (
-            f"expected at least {FEWEST} means of {one.average} samples, got {numbers.size}: take fewer for a mean"
-        )
-        raise refusal(table.path, message, "--average")
-    if one.average > 1 and np.isnan(numbers).all():
-        message = f"{one.label} has a value in too few rows for means of {one.average} samples: --average 1 keeps all"
-        raise refusal(table.path, message, "--average")
+    _refuse_few_means(one, numbers)
     if clock is not None and one.average > 1:
         refuse_uneven(table, clock)
         notes.append(f"means of {one.average} samples of {clock.rate_hz:.6g} Hz")
@@ -221,6 +211,25 @@ def _channel(one: Plan, values: NDArray[Any], stamps: NDArray[np.int64] | None, 
         factor=one.factor,
         start_ns=one.offset_ns,
     )
+
+
+def _refuse_infinite(one: Plan, numbers: NDArray[np.float64]) -> None:
+    if np.isinf(numbers).any():
+        row = int(np.argmax(np.isinf(numbers)))
+        message = f"expected a finite number in {one.label}, got {float(numbers[row])!r}; fill it or cut the record"
+        raise refusal(one.table.path, message, line=one.table.line(row * one.average))
+
+
+def _refuse_few_means(one: Plan, numbers: NDArray[np.float64]) -> None:
+    """Refuse a channel of which means leave too little, or nothing."""
+    if one.average > 1 and numbers.size < FEWEST:
+        message = (
+            f"expected at least {FEWEST} means of {one.average} samples, got {numbers.size}: take fewer for a mean"
+        )
+        raise refusal(one.table.path, message, "--average")
+    if one.average > 1 and np.isnan(numbers).all():
+        message = f"{one.label} has a value in too few rows for means of {one.average} samples: --average 1 keeps all"
+        raise refusal(one.table.path, message, "--average")
 
 
 def is_sparse(numbers: NDArray[np.float64]) -> bool:

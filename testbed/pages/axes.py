@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-from testbed.pages.numbers import decade, plain, significant
+from testbed.pages.numbers import plain
 from testbed.pages.svg import INK
 
 if TYPE_CHECKING:
@@ -40,15 +40,15 @@ def draw(
     scale: float = DEGREE,
     mark: Mark | None = None,
 ) -> None:
-    """Fill between the extremes, times `scale`, with an outline so that a quiet signal is still a line; a few marks
-    tell it from others where there is no colour.
+    """Fill between the extremes, times `scale`, with an outline so that a quiet signal is still a line; a few marks,
+    dark so that they stand out of the area, tell it from others where there is no colour.
     """
     low, high = scale * envelope.low, scale * envelope.high
     axes.fill_between(
         envelope.time, low, high, facecolor=color, edgecolor=color, linewidth=width, alpha=alpha, joinstyle="round"
     )
     if mark is not None:
-        style = marked(mark, color, envelope.time.size) | {"linestyle": "none"}
+        style = on_area(mark, color, envelope.time.size) | {"linestyle": "none"}
         axes.plot(envelope.time, (low + high) / 2.0, color=color, **style)
 
 
@@ -79,6 +79,21 @@ def marked(mark: Mark, color: str, n_points: int | None = None) -> dict[str, Any
     return style
 
 
+def on_area(mark: Mark, color: str, n_points: int | None = None) -> dict[str, Any]:
+    """Return the look of the edge of a filled area, as `marked`: full, for an area has no dashes, and with dark marks.
+
+    Parameters
+    ----------
+    mark : Mark
+        Of the name.
+    color : str
+        Of the area.
+    n_points : int, optional
+        As of `marked`.
+    """
+    return marked(mark, color, n_points) | {"linestyle": "-", "markeredgecolor": INK}
+
+
 def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42) -> None:
     """Put the legend above the axes, in equal rows as wide as its longest name allows, and set the margins in inches.
 
@@ -86,21 +101,24 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
     """
     entry_pt = 45.0 + 5.4 * max(len(str(handle.get_label())) for handle in handles)
     n_rows = -(-len(handles) // max(1, int(72.0 * WIDTH_IN / entry_pt)))
+    n_columns = -(-len(handles) // n_rows)
     width, height = figure.get_size_inches()
     top = height - 0.08 - 0.2 * n_rows
     figure.legend(
-        handles=handles,
+        # The library fills column by column; people read row by row.
+        handles=[handle for column in range(n_columns) for handle in handles[column::n_columns]],
         loc="lower left",
         bbox_to_anchor=(0.0, top / height),
-        ncols=-(-len(handles) // n_rows),
+        ncols=n_columns,
         borderaxespad=0.0,
     )
+    figure.align_ylabels()
     place = figure.axes[0].get_subplotspec()
     rows = len(figure.axes) if place is None else place.get_gridspec().nrows
     each = (top - 0.3 - 0.48) / rows
     figure.subplots_adjust(
         left=0.82 / width,
-        right=1.0 - 0.14 / width,
+        right=1.0 - 0.2 / width,
         bottom=0.48 / height,
         top=(top - 0.3) / height,
         hspace=min(gap_in / max(each - gap_in, 0.1), 1.0),
@@ -110,25 +128,6 @@ def arrange(figure: Figure, handles: list[Line2D | Patch], gap_in: float = 0.42)
 def label(group: str) -> str:
     """Return the instance's name; a dollar sign would start a formula."""
     return group.split("/", 1)[-1].replace("$", r"\$")
-
-
-def decade_axis(axes: Axes) -> None:
-    """Label the powers of ten of a logarithmic y axis whose limits stand, and 2 and 5 times them where fewer than two
-    are seen.
-
-    Not by matplotlib's own formatter: its typesetting of powers takes a quarter of the time of the whole report.
-
-    Parameters
-    ----------
-    axes : Axes
-        Whose y axis it is.
-    """
-    low, high = np.log10(axes.get_ylim())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    if np.floor(high) - np.ceil(low) < 1.0:
-        axes.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: significant(value, 1)))
 
 
 def time_axis(axes: Axes, span_s: float, *, named: bool = True) -> None:

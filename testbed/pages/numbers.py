@@ -30,18 +30,21 @@ def significant(value: float | None, digits: int = 3) -> str:
     return f"{mantissa}×10{str(power).translate(_SUPERSCRIPT)}".replace("-", "−")
 
 
-def decade(value: float) -> str:
-    """Return a power of ten as text, such as 10⁻³; the digits outside 1e-2 to 1e2 only, and nothing for other numbers.
+def decade(value: float, span: tuple[float, float]) -> str:
+    """Return a mark of a logarithmic axis as text: all of an axis in digits, 0.001 to 10000, or all as 10⁻⁵, 2×10⁻⁵.
 
     Parameters
     ----------
     value : float
-        Number on a logarithmic axis, any unit.
+        One to nine times a power of ten, any unit.
+    span : tuple of float
+        Where the axis starts and ends.
     """
-    power = round(math.log10(value))
-    if abs(value / 10.0**power - 1.0) > 1e-9:
-        return ""
-    return plain(value) if abs(power) <= 2 else f"10{str(power).translate(_SUPERSCRIPT)}"
+    if min(span) >= 1e-3 * (1.0 - 1e-9) and max(span) <= 1e4 * (1.0 + 1e-9):
+        return plain(value)
+    mantissa, _, power = f"{value:.0e}".partition("e")
+    times = "" if mantissa == "1" else f"{mantissa}×"
+    return f"{times}10{str(int(power)).translate(_SUPERSCRIPT)}"
 
 
 def fixed(value: float | None, decimals: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from testbed.scenario.model import resolved_fusion
+from testbed.scenario.resolved import resolved_fusion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -12,7 +12,7 @@ from testbed.fusion.belief_file import is_belief_file, read_belief
 from testbed.inputs.plain import plain_tree
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake
-from testbed.scenario.model import dump
+from testbed.scenario.resolved import dump
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

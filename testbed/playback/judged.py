@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from testbed.scenario.model import FilterSpec
 
 
-def judged(reels: Sequence[Reel], specs: Mapping[str, FilterSpec], *, fix: bool) -> tuple[list[Reel], Verdict]:
+def judged(
+    reels: Sequence[Reel], specs: Mapping[str, FilterSpec], said: Mapping[str, float], *, fix: bool
+) -> tuple[list[Reel], Verdict]:
     """Return the sensors of a recording, put right if that is asked for, and what stands against them.
 
     Parameters
@@ -25,12 +27,14 @@ def judged(reels: Sequence[Reel], specs: Mapping[str, FilterSpec], *, fix: bool)
         Of the sensors.
     specs : mapping of str to FilterSpec
         The filters; the belief of the first is held against the readings.
+    said : mapping of str to float
+        How many of the unit that was said of a sensor's readings are 1 rad/s [-].
     fix : bool
         Put right what is safe.
     """
     belief = next(iter(specs.values())).belief
     readings, stamps = {reel.name: reel.rate for reel in reels}, {reel.name: reel.stamps() for reel in reels}
-    found = verdict(readings, stamps, belief)
+    found = verdict(readings, stamps, belief, said)
     if not fix or not found.findings:
         return list(reels), found
     done = remedied(readings, stamps, found)

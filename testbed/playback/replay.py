@@ -26,9 +26,9 @@ from testbed.playback.judged import finding_entry, judged
 from testbed.playback.lineup import Lineup, line_up
 from testbed.playback.player import play_through, start_filters
 from testbed.playback.reel import Reel, wind
-from testbed.playback.sinks import replay_sinks
-from testbed.playback.source import ReplaySource, open_source
-from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
+from testbed.playback.sinks import Room, replay_sinks
+from testbed.playback.source import OpenedSource, ReplaySource, open_source
+from testbed.runs.folder import RunFolder, check_free, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.metrics import ReplayMetrics, RunMetrics
 from testbed.runs.outputs import chosen
 from testbed.runs.results import MemoryStore
@@ -157,6 +157,8 @@ def replay(
         If the recording cannot be read or used, or a filter, belief or map does not fit it: everything at once.
     RunError
         If a plug-in fails, or the disk is full.
+    ValueError
+        If there are `outputs` and no folder that they go to.
 
     Examples
     --------
@@ -172,10 +174,22 @@ def replay(
     >>> run.fusion["kalman"].rate.shape, run.metrics.replay.reference
     ((20000,), False)
     """
+    if out is None and outputs is not None:
+        msg = "outputs: expected only beside out, the folder that they go to"
+        raise ValueError(msg)
+    wanted = None if outputs is None else tuple(outputs)
+    check_target(out, wanted)
     made = prepare(
         log, filters, map=map, belief=belief, start=start, fix=fix, settle=settle, lines=lines, plugins=plugins
     )
-    return play_back(made, out, outputs=outputs, block=block, progress=progress)
+    return play_back(made, out, outputs=wanted, block=block, progress=progress)
+
+
+def check_target(out: str | Path | None, outputs: Iterable[str] | None) -> None:
+    """Raise ScenarioError before a recording is read if there are no such outputs, or `out` holds something else."""
+    chosen(outputs)
+    if out is not None:
+        check_free(Path(out))
 
 
 def prepare(
@@ -197,20 +211,24 @@ def prepare(
     if start not in {None, "unknown", "rest"}:
         raise ScenarioError([Problem(f"expected unknown or rest, got {quoted(start)}", "--start")])
     loaded = load_plugins(plugins)
-    source = open_source([log] if isinstance(log, str | Path) else log, map)
+    opened = open_source([log] if isinstance(log, str | Path) else log, map)
     names, file = _asked(filters)
-    specs = filter_specs(source.sensors, names, fusion if file is None else file, belief, start, loaded)
-    both = [name for name in specs if name in source.sensors]
+    specs = filter_specs(opened.sensors, names, fusion if file is None else file, belief, start, loaded)
+    both = [name for name in specs if name in opened.sensors]
     if both:
         message = (
             f"is the name of a sensor too: give the filter another one, such as 'mine: {{type: {specs[both[0]].type}}}'"
         )
         raise ScenarioError([Problem(message, f"fusion.{both[0]}")])
-    reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, fix=fix)
+    # What is wrong is told before a long recording is read.
+    _check_asked(settle, lines, opened)
+    source = opened.read()
+    said = {name: 1.0 / abs(one.factor) for name, one in source.sensors.items() if one.kind == "rate"}
+    reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, said, fix=fix)
     reference = None if source.reference is None else wind(source.reference, middle=True)
     lineup = line_up(reels, reference, source.log)
     chosen_settle = min(_SETTLING * lineup.duration, _LONGEST_SETTLING) if settle is None else settle
-    if not 0.0 <= chosen_settle < lineup.duration:
+    if chosen_settle >= lineup.duration:
         message = f"expected less than the {lineup.duration:g} s of the recording, got {chosen_settle:g} s"
         raise ScenarioError([Problem(message, "--settle")])
     _check_lines(lines, lineup)
@@ -247,7 +265,8 @@ def play_back(
         folder = stack.enter_context(RunFolder(Path(out)))
         reach = stack.enter_context(failing_as_run_error(str(out)))
         check_interrupt = stack.enter_context(held_interrupts())
-        sinks = replay_sinks(stack, folder.path, made.name, made.lineup, list(made.specs), made.settle, wanted)
+        room = Room(folder.path, Path(out), made.lineup, made.rates, made.settle, wanted)
+        sinks = [room, *replay_sinks(stack, folder.path, made.name, made.lineup, list(made.specs), made.settle, wanted)]
 
         def tick(done: float) -> None:
             reach(done)
@@ -306,15 +325,31 @@ def _reference(part: PlayedBlock, lineup: Lineup) -> dict[str, FloatArray]:
     return {name: lineup.references[name][first : first + n] for name, (first, n) in spans.items()}
 
 
+def _check_asked(settle: float | None, lines: Sequence[float], opened: OpenedSource) -> None:
+    problems = []
+    if settle is not None and not 0.0 <= settle < math.inf:
+        problems.append(Problem(f"expected a time from 0 s on, got {settle:g} s", "--settle"))
+    problems += [
+        Problem(f"expected frequencies above 0 Hz, got {line:g} Hz", "--lines")
+        for line in lines
+        if not 0.0 < line < math.inf
+    ]
+    if lines and opened.reference is None:
+        message = "gain and phase need a reference: name the channel that is the truth 'reference' in the map"
+        problems.append(Problem(message, "--lines"))
+    if problems:
+        raise ScenarioError(problems)
+
+
 def _check_lines(lines: Sequence[float], lineup: Lineup) -> None:
     half = 0.5 * lineup.rates["base"]
-    wrong = [line for line in lines if not (math.isfinite(line) and 0.0 < line < half)]
-    if wrong:
-        message = f"expected frequencies between 0 and {half:g} Hz, got {wrong[0]:g} Hz"
-        raise ScenarioError([Problem(message, "--lines")])
-    if lines and lineup.references is None:
-        message = "gain and phase need a reference: name the channel that is the truth 'reference' in the map"
-        raise ScenarioError([Problem(message, "--lines")])
+    problems = [
+        Problem(f"expected frequencies below {half:g} Hz, half the fastest rate, got {line:g} Hz", "--lines")
+        for line in lines
+        if line >= half
+    ]
+    if problems:
+        raise ScenarioError(problems)
 
 
 def _channel(channel: LogChannel, reel: Reel, lineup: Lineup) -> dict[str, Any]:

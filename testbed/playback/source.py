@@ -12,7 +12,7 @@ from testbed.logs.channel import Log
 from testbed.logs.formats import open_table
 from testbed.logs.logmap import LogMap
 from testbed.logs.options import refusal
-from testbed.logs.plan import ROTATIONS
+from testbed.logs.plan import ROTATIONS, Plan
 from testbed.logs.proposal import propose, unsaid
 from testbed.logs.reader import as_map, is_map, plans_of, read_plans
 from testbed.runs.folder import SIGNALS
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from testbed.logs.channel import LogChannel
-    from testbed.logs.plan import Plan
     from testbed.runs.signals import Signals
 
 REFERENCE = "reference"
@@ -54,10 +53,43 @@ class ReplaySource:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class OpenedSource:
+    """A recording of which it is known what is to be replayed, before it is read.
+
+    Parameters
+    ----------
+    name, log, notes : str, str, tuple of str
+        As of `ReplaySource`.
+    sensors : tuple of str
+        Names of the channels that are rates or angles.
+    reference : str, optional
+        Name of the one that is taken for the truth.
+    channels : mapping of str to Plan or LogChannel
+        All that it holds, to be read or read.
+    """
+
+    name: str
+    log: str
+    sensors: tuple[str, ...]
+    reference: str | None
+    notes: tuple[str, ...]
+    channels: Mapping[str, Plan | LogChannel]
+
+    def read(self) -> ReplaySource:
+        """Return the channels read, those of one group of a file in one pass; ScenarioError if that fails."""
+        wanted = (*self.sensors, *([] if self.reference is None else [self.reference]))
+        chosen = {name: self.channels[name] for name in wanted}
+        found = {name: one for name, one in chosen.items() if not isinstance(one, Plan)}
+        found |= read_plans([one for one in chosen.values() if isinstance(one, Plan)])
+        reference = None if self.reference is None else found[self.reference]
+        return ReplaySource(self.name, self.log, {name: found[name] for name in self.sensors}, reference, self.notes)
+
+
 def open_source(
     logs: Sequence[str | Path] | Log, map: LogMap | Mapping[str, Any] | str | Path | None = None
-) -> ReplaySource:
-    """Return the channels to be replayed.
+) -> OpenedSource:
+    """Return what is to be replayed, not yet read.
 
     Parameters
     ----------
@@ -73,10 +105,10 @@ def open_source(
         If something cannot be read, is missing or open: everything at once, with its remedy.
     """
     if isinstance(logs, Log):
-        return _source(logs.path, logs.channels)
+        return _opened(logs.path, logs.channels)
     files = [Path(one) for one in logs]
     if len(files) == 1 and (folder := _run_folder(files[0])) is not None and map is None:
-        return _source(files[0], read_plans(plans_of(folder / SIGNALS, _map_of_run(folder))))
+        return _planned(files[0], plans_of(folder / SIGNALS, _map_of_run(folder)))
     if map is None and len(files) == 1 and is_map(files[0]):
         files, map = [], files[0]
     if map is None:
@@ -87,7 +119,7 @@ def open_source(
         found, files = found.model_copy(update={"file": files}), []
     plans = plans_of(files[0] if files else None, found)
     place = files[0] if files else Path(map) if isinstance(map, str | Path) else plans[0].table.path
-    return _source(place, read_plans(plans))
+    return _planned(place, plans)
 
 
 def _run_folder(path: Path) -> Path | None:
@@ -111,7 +143,7 @@ def _map_of_run(folder: Path) -> LogMap:
     return LogMap.model_validate({"channels": channels}, context={"border": True})
 
 
-def _unmapped(files: Sequence[Path]) -> ReplaySource:
+def _unmapped(files: Sequence[Path]) -> OpenedSource:
     if not files:
         message = "expected a recording: name a file, or a map that does with --map"
         raise ScenarioError([Problem(message, "LOG")])
@@ -128,7 +160,7 @@ def _unmapped(files: Sequence[Path]) -> ReplaySource:
         raise ScenarioError([Problem(f"to be said: {text}", "--map", str(files[0])) for text in words] + [
             Problem(remedy, "--map", str(files[0]))
         ])  # fmt: skip
-    return _source(files[0], read_plans([_named(one, plans) for one in plans]))
+    return _planned(files[0], [_named(one, plans) for one in plans])
 
 
 def _named(one: Plan, plans: Sequence[Plan]) -> Plan:
@@ -146,15 +178,19 @@ def _check_names(sensors: Iterable[str], place: Path) -> None:
         raise ScenarioError([Problem(message, f"channels.{shortened(name)}", str(place)) for name in odd])
 
 
-def _source(place: Path, channels: Mapping[str, LogChannel]) -> ReplaySource:
+def _planned(place: Path, plans: Iterable[Plan]) -> OpenedSource:
+    return _opened(place, {one.name: one for one in plans})
+
+
+def _opened(place: Path, channels: Mapping[str, Plan | LogChannel]) -> OpenedSource:
     turning = {name: one for name, one in channels.items() if one.quantity in ROTATIONS or one.kind is not None}
     others = [name for name in channels if name not in turning]
     notes = (f"{', '.join(others)}: neither a rate nor an angle, left out",) if others else ()
-    sensors = {name: one for name, one in turning.items() if name.lower() != REFERENCE}
-    reference = next((one for name, one in turning.items() if name.lower() == REFERENCE), None)
+    sensors = tuple(name for name in turning if name.lower() != REFERENCE)
+    reference = next((name for name in turning if name.lower() == REFERENCE), None)
     if not sensors:
         raise refusal(place, "expected a channel that is a rate or an angle beside the reference, got none")
     _check_names(sensors, place)
     stem = place.resolve().name.split(".")[0]
     name = place.resolve().parent.name if stem in {"log", "run", "data"} else stem
-    return ReplaySource(name or "recording", str(place), sensors, reference, notes)
+    return OpenedSource(name or "recording", str(place), sensors, reference, notes, channels)

@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import mix, rgb
-from testbed.recording.stream import FRAMES
-from testbed.recording.world import INK, nice_ceiling
+from testbed.recording.stream import FRAMES, INK
+from testbed.recording.world import nice_ceiling
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,11 +48,11 @@ class Channel:
     def __init__(self, recording: Recording, sensor: str, heights: FloatArray, color: str, unit: RateUnit) -> None:
         self.entity = f"/sensors/{sensor}/channel"
         self._recording, self._heights, self._color, self._unit = recording, heights, color, unit
-        self._largest = 0.0
+        self._largest = self._full = 0.0
         self._batch = recording.batch(self._send, FRAMES)
         wanted = np.array(FRACTIONS) * heights.max()
         self.probes = np.abs(heights[:, np.newaxis] - wanted).argmin(axis=0)
-        names = [f"u(h = {heights[node] * 1e3:.2f} mm) [{unit}]" for node in self.probes]
+        names = [f"u(h = {heights[node] * 1e3:.2f} mm)" for node in self.probes]
         shades = [mix(color, "#e2553d", share) for share in np.linspace(0, 1, len(names))]
         recording.lines(f"{self.entity}/velocity", names, shades)
 
@@ -68,6 +68,8 @@ class Channel:
         """
         self._largest = max(self._largest, float(np.abs(profiles).max(initial=0.0)))
         self._batch.add(index, profiles)
+        if self._recording.live:
+            self._draw_axes()
 
     def _send(self, index: NDArray[np.int64], profiles: FloatArray) -> None:
         points = np.stack(np.broadcast_arrays(profiles, self._heights), axis=-1).astype(np.float32)
@@ -78,7 +80,14 @@ class Channel:
     def finish(self) -> None:
         """Send what is held back and draw the axes, whose range is known only now."""
         self._batch.flush()
+        self._draw_axes()
+
+    def _draw_axes(self) -> None:
+        """Draw the axes for the largest velocity so far, if they are not those that are there."""
         full = nice_ceiling(self._largest if self._largest > SMALLEST else 1.0)
+        if full == self._full:
+            return
+        self._full = full
         top = float(self._heights.max())
         to_box = rr.Transform3D(scale=[WIDTH / 2 / full, -HEIGHT / top, 1.0])
         style = rr.LineStrips2D.from_fields(
@@ -95,11 +104,4 @@ class Channel:
             (0.0, 27.0, f"fluid minus wall, per radius [{self._unit}]"),
             (-right + 12.0, up - 16.0, "height above lower wall [mm]"),
         ]
-        places = rr.Points2D(
-            [text[:2] for text in texts],
-            labels=[text[2] for text in texts],
-            colors=rgb(INK),
-            radii=0.01,
-            show_labels=True,
-        )
-        self._recording.static(f"{self.entity}/labels", places)
+        self._recording.texts(f"{self.entity}/labels", texts)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from testbed.recording.channel import HEIGHT, WIDTH
+from testbed.recording.plots import BESIDE, LEGEND, at_cursor, errors_in_row, plot
 from testbed.recording.stream import TIMELINE
 from testbed.recording.target import ENTITY as TARGET
 from testbed.recording.target import HALF
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
 
     import mujoco
 
+    from testbed.recording.plots import Extremes
     from testbed.recording.stream import Clock
     from testbed.units import RateUnit
 
 ZOOM = 0.05  # s on each side of the time cursor
+LATELY = 2.0  # s before the time cursor while a run is watched
 SHOWN = 0.5  # s of the window recorded sample by sample
 FEWEST = 1000  # samples in both, at the least
-LEGEND = 0.25  # room for the legend, as a share of the span
-MARGIN = 0.05  # room on the right, as a share of the span, in which the last time on the axis stands whole
 LOG = "log10_"
 # Points of the screen: what plots share in a window of 900, what a plot needs beside its legend, and a name in that.
 ROOM, FRAME, ENTRY = 834, 88, 23
@@ -50,13 +51,15 @@ DIAGNOSTICS = {  # prefix of the name: name of the tab, short, since all share a
 }
 
 
+# Kinds whose scale is set by the start too: what is counted, and logarithms.
+UNSETTLED = frozenset(kind for kind in DIAGNOSTICS if kind.startswith((LOG, "gated_", "band_")))
 # What a row of plots is about, its views, which are tabs, and how many lines the first of them names.
 Row = tuple[str, "list[rrb.View | rrb.Container]", int]
 
 
 def blueprint(
     *,
-    entities: Sequence[str],
+    entities: Mapping[str, Extremes],
     sensors: Sequence[str],
     filters: Sequence[str],
     channels: Sequence[str],
@@ -70,8 +73,8 @@ def blueprint(
 
     Parameters
     ----------
-    entities : sequence of str
-        Paths of the scalar signals that are to be seen.
+    entities : mapping of str to tuple of float or None
+        Paths of the scalar signals that are to be seen, with their extremes after settle as far as these are known.
     sensors, filters, channels : sequence of str
         Names of the sensors, of the filters and of the sensors that have a velocity profile.
     model : mujoco.MjModel, optional
@@ -96,45 +99,45 @@ def blueprint(
     left: list[rrb.View | rrb.Container] = [] if model is None else [_turntable(model)]
     if channels:
         probes = [(f"At three heights, {n} [{unit}]", [f"/sensors/{n}/channel/velocity"]) for n in channels]
-        left.append(_tabs([*map(_profile, channels), *(_plot(*probe, zoom) for probe in probes)]))
+        left.append(_tabs([*map(_profile, channels), *(plot(*probe, zoom) for probe in probes)]))
+    closer = [
+        plot(f"Rate, {span} [{unit}]", [*rates, *marks], zoom),
+        at_cursor(f"Rate ±{_short(around)} at the cursor [{unit}]", [*rates, *marks], (-around, around)),
+        plot(f"{estimated} [{unit}]", truth_and_filters, (0.0, duration)),
+    ]
+    if live:
+        # Who looks on sees what comes in: in front stands what moves with it, and the whole run.
+        closer.insert(0, at_cursor(f"Rate, the last {LATELY:g} s [{unit}]", [*rates, *marks], (-LATELY, 0.0)))
     right: list[Row] = [
-        ("Rates", [_plot(f"Rate, whole run [{unit}]", rates, (0.0, duration))], len(rates)),
-        (
-            "Rates, closer",
-            [
-                _plot(f"Rate, {span} [{unit}]", [*rates, *marks], zoom),
-                _at_cursor(f"Rate ±{_short(around)} at the cursor [{unit}]", [*rates, *marks], around),
-                _plot(f"{estimated} [{unit}]", truth_and_filters, (0.0, duration)),
-            ],
-            len(rates) + len(marks),
-        ),
+        ("Rates", [plot(f"Rate, whole run [{unit}]", rates, (0.0, duration))], len(rates)),
+        ("Rates, closer", closer, len(rates) + len(marks)),
     ]
     views: list[rrb.View | rrb.Container]
-    errors = [entity for entity in entities if entity.endswith("/error") and entity.startswith("/fusion/")]
+    errors = {entity: entities[entity] for entity in entities if re.fullmatch(r"/fusion/[^/]+/error", entity)}
     if errors:
         views = [
-            _plot(f"Error = estimate − truth, {span} [{unit}]", errors, zoom),
-            _plot(f"Error from {window[0]:g} s on [{unit}]", errors, (window[0], duration)),
-            _plot(f"Error, whole run [{unit}]", errors, (0.0, duration)),
+            errors_in_row(f"Error = estimate − truth, {span}", "Error of {}", errors, zoom, unit),
+            errors_in_row(f"Error from {window[0]:g} s on", "{}, settled", errors, (window[0], duration), unit),
+            errors_in_row("Error, whole run", "{}, whole run", dict.fromkeys(errors), (0.0, duration), unit),
         ]
-        right.append(("Errors", views, len(errors)))
+        right.append(("Errors", views[::-1] if live else views, 3 if len(errors) <= BESIDE else 8))
     if sights := [entity for entity in entities if entity.startswith("/pointing/")]:
         left.append(_target())
         views = [
-            _plot(f"Pointing error, {span} [µrad]", sights, zoom),
-            _plot(f"Pointing error from {window[0]:g} s on [µrad]", sights, (window[0], duration)),
+            plot(f"Pointing error, {span} [µrad]", sights, zoom),
+            plot(f"Pointing error from {window[0]:g} s on [µrad]", sights, (window[0], duration)),
         ]
         right.append(("Pointing", views, len(sights)))
     thermometers = [entity for entity in entities if entity.endswith("/temperature")]
     if thermometers:
         drifts = [entity for entity in entities if entity.endswith("/drift")]
         views = [
-            _plot("Temperature inside [K]", thermometers, (0.0, duration)),
-            _plot(f"True thermal drift [{unit}]", drifts, (0.0, duration)),
+            plot("Temperature inside [K]", thermometers, (0.0, duration)),
+            plot(f"True thermal drift [{unit}]", drifts, (0.0, duration)),
         ]
         right.append(("Temperature", views, len(thermometers)))
     if diagnostics := _diagnostics(entities, sensors):
-        views = [_beside(kind, by_sensor, duration, unit) for kind, by_sensor in diagnostics.items()]
+        views = [_beside(kind, by_sensor, entities, duration, unit) for kind, by_sensor in diagnostics.items()]
         # These plots have titles of their own below the tabs'.
         n_lines = 1 + max(map(len, next(iter(diagnostics.values())).values()))
         right.append(("Inside the filters", views, n_lines))
@@ -164,41 +167,11 @@ def _tabs(views: Sequence[rrb.View | rrb.Container], name: str | None = None) ->
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0, name=name)
 
 
-def _absolute(seconds: float) -> rrb.TimeRangeBoundary:
-    return rrb.TimeRangeBoundary.absolute(seconds=seconds)
-
-
-def _plot(name: str, contents: Iterable[str], span: tuple[float, float], legend: float = LEGEND) -> rrb.TimeSeriesView:
-    data = rr.TimeRange(start=_absolute(span[0]), end=_absolute(span[1]))
-    # The legend stands in an empty margin, not on the curves.
-    length = span[1] - span[0]
-    shown = rr.TimeRange(start=_absolute(span[0] - legend * length), end=_absolute(span[1] + MARGIN * length))
-    return _series(name, contents, data, shown)
-
-
 def _short(seconds: float) -> str:
     return f"{seconds:g} s" if seconds >= 1.0 else f"{1e3 * seconds:g} ms"
 
 
-def _at_cursor(name: str, contents: Iterable[str], around: float) -> rrb.TimeSeriesView:
-    at = rrb.TimeRangeBoundary.cursor_relative
-    data = rr.TimeRange(start=at(seconds=-around), end=at(seconds=around))
-    shown = rr.TimeRange(start=at(seconds=-around * (1 + 2 * LEGEND)), end=at(seconds=around * (1 + 2 * MARGIN)))
-    return _series(name, contents, data, shown)
-
-
-def _series(name: str, contents: Iterable[str], data: rr.TimeRange, shown: rr.TimeRange) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=list(contents),
-        name=name,
-        axis_x=rrb.TimeAxis(view_range=shown),
-        time_ranges=[rrb.VisibleTimeRange(TIMELINE, range=data)],
-        plot_legend=rrb.PlotLegend("LeftTop"),
-    )
-
-
-def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+def _diagnostics(entities: Iterable[str], sensors: Sequence[str]) -> dict[str, dict[str, list[str]]]:
     """Return by quantity, which is a tab, and sensor the entities of a plot, for sensors differ by orders of magnitude;
     what is there as its logarithm is seen as that.
     """
@@ -213,15 +186,24 @@ def _diagnostics(entities: Sequence[str], sensors: Sequence[str]) -> dict[str, d
     return {kind: by_sensor for kind, by_sensor in groups.items() if by_sensor and not groups.get(LOG + kind)}
 
 
-def _beside(kind: str, contents_of: Mapping[str, Sequence[str]], duration: float, unit: RateUnit) -> rrb.Container:
+def _beside(
+    kind: str,
+    contents_of: Mapping[str, Sequence[str]],
+    entities: Mapping[str, Extremes],
+    duration: float,
+    unit: RateUnit,
+) -> rrb.Container:
     tab, quantity, dimension = DIAGNOSTICS[kind]
     suffix = f" [{dimension.format(unit)}]" if dimension else ""
     # What has no name of a kind is many quantities, each a tab; sensors stand beside each other.
     n_beside = len(contents_of) if kind else 1
-    plots = [
-        _plot(", ".join(filter(None, (quantity, of))) + suffix, contents, (0.0, duration), LEGEND * n_beside)
-        for of, contents in contents_of.items()
-    ]
+    plots = []
+    for of, contents in contents_of.items():
+        name = ", ".join(filter(None, (quantity, of))) + suffix
+        known = [found for found in map(entities.get, contents) if found is not None and kind not in UNSETTLED]
+        # A filter that starts from nothing may be far off at first.
+        extremes = (min(low for low, _ in known), max(high for _, high in known)) if known else None
+        plots.append(plot(name, contents, (0.0, duration), LEGEND * n_beside, extremes))
     return rrb.Horizontal(*plots, name=tab) if kind else rrb.Tabs(*plots, active_tab=0, name=tab)
 
 

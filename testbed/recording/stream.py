@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 TIMELINE = "sim_time"
+INK = "#8a8f98"
 ROWS = 16384  # rows of scalars sent at once; the viewer cuts chunks to 4096 rows anyway
 FRAMES = 512  # rows of poses and profiles, which are larger
 
@@ -62,14 +63,24 @@ class Clock:
 
 
 class Recording:
-    """A Rerun stream with the run's clock; every call is strict, so nothing is dropped with a warning."""
+    """A Rerun stream with the run's clock; every call is strict, so nothing is dropped with a warning.
+
+    Parameters
+    ----------
+    stream : RecordingStream
+        Where everything goes.
+    clock : Clock
+        Of the run.
+    live : bool, optional
+        Whether somebody looks on: what there is to see is drawn as soon as it is known, in the scale that fits so far.
+    """
 
     def __init__(self, stream: rr.RecordingStream, clock: Clock, *, live: bool = False) -> None:
-        self.stream, self.clock, self._live = stream, clock, live
+        self.stream, self.clock, self.live = stream, clock, live
 
     def batch(self, send: Callable[..., None], size: int) -> Batch:
         """Return what holds rows back until there are `size` of them; if somebody looks on, nothing is held back."""
-        return Batch(send, 1 if self._live else size)
+        return Batch(send, 1 if self.live else size)
 
     def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what does not change in time."""
@@ -89,6 +100,12 @@ class Recording:
         rgbs = [rgb(color) for color in colors]
         style = rr.SeriesLines(names=names, colors=rgbs, widths=widths, aggregation_policy="MinMax")
         self.static(entity, style)
+
+    def texts(self, entity: str, texts: Sequence[tuple[float, float, str]]) -> None:
+        """Write words into a flat view, each at its place (x, y)."""
+        places = [(x, y) for x, y, _ in texts]
+        words = [text for _, _, text in texts]
+        self.static(entity, rr.Points2D(places, labels=words, colors=rgb(INK), radii=0.01, show_labels=True))
 
 
 class Batch:
@@ -144,6 +161,13 @@ class Signal:
         Whether what is not finite is lost and leaves a gap; otherwise it was not due.
     times_ns : ndarray, shape (n_sample,), optional
         Stamps of its samples [ns], of a signal that is not on the clock of the run.
+    settle : float, optional
+        Start of the part whose extremes are `settled` [s].
+
+    Attributes
+    ----------
+    settled : tuple of float or None
+        Least and largest finite value from then on, as far as it is sent.
     """
 
     def __init__(
@@ -158,8 +182,11 @@ class Signal:
         detailed: bool = True,
         gaps: bool = True,
         times_ns: NDArray[np.int64] | None = None,
+        settle: float = 0.0,
     ) -> None:
         self.entity = entity
+        self.settled: tuple[float, float] | None = None
+        self._settle = np.timedelta64(round(1e9 * settle), "ns")
         self._recording, self._stride, self._times = recording, stride, times_ns
         clock = recording.clock
         self._chooser = (
@@ -182,4 +209,11 @@ class Signal:
     def _send(self, index: NDArray[np.int64], values: FloatArray) -> None:
         clock = self._recording.clock
         own = clock.nanoseconds(index * self._stride) if self._times is None else self._times[index]
-        self._recording.rows(self.entity, own.astype("timedelta64[ns]"), rr.Scalars.columns(scalars=values))
+        stamps = own.astype("timedelta64[ns]")
+        self._recording.rows(self.entity, stamps, rr.Scalars.columns(scalars=values))
+        late = values[(stamps >= self._settle) & np.isfinite(values)]
+        if late.size:
+            low, high = float(late.min()), float(late.max())
+            self.settled = (
+                (low, high) if self.settled is None else (min(low, self.settled[0]), max(high, self.settled[1]))
+            )

@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from testbed.pages.palette import rgb
-from testbed.recording.stream import FRAMES
-from testbed.recording.world import INK, nice_ceiling
+from testbed.recording.stream import FRAMES, INK
+from testbed.recording.world import nice_ceiling
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +39,8 @@ class Target:
     """
 
     def __init__(self, recording: Recording, colors: dict[str, str]) -> None:
-        self._recording, self._colors, self._largest = recording, colors, 0.0
+        self._recording, self._colors = recording, colors
+        self._largest = self._full = 0.0
         self._batches = {name: recording.batch(self._sender(name), FRAMES) for name in colors}
 
     def write(self, name: str, index: NDArray[np.int64], residual: FloatArray) -> None:
@@ -56,6 +57,8 @@ class Target:
         """
         self._largest = max(self._largest, float(np.max(np.abs(residual), initial=0.0)))
         self._batches[name].add(index, residual)
+        if self._recording.live:
+            self._draw_axes()
 
     def _sender(self, name: str) -> Callable[..., None]:
         def send(index: NDArray[np.int64], residual: FloatArray) -> None:
@@ -68,7 +71,14 @@ class Target:
         """Send what is held back and draw the target, whose scale is known only now."""
         for batch in self._batches.values():
             batch.flush()
+        self._draw_axes()
+
+    def _draw_axes(self) -> None:
+        """Draw the target for the largest error so far, if it is not the one that is there."""
         full = _URAD * nice_ceiling(self._largest if self._largest > _SMALLEST else 1e-6)
+        if full == self._full:
+            return
+        self._full = full
         row = 2.0 * HALF / max(len(self._colors), 1)
         turn = np.linspace(0.0, 2.0 * np.pi, 121)
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -85,11 +95,4 @@ class Target:
         self._recording.static(f"{ENTITY}/axes", axes)
         labels += [(share * HALF, HALF + 14.0, f"{share * full:g}") for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
         labels.append((0.0, HALF + 39.0, "pointing error [µrad]"))
-        texts = rr.Points2D(
-            [place[:2] for place in labels],
-            labels=[place[2] for place in labels],
-            colors=rgb(INK),
-            radii=0.01,
-            show_labels=True,
-        )
-        self._recording.static(f"{ENTITY}/labels", texts)
+        self._recording.texts(f"{ENTITY}/labels", labels)

@@ -87,9 +87,7 @@ def _require_display(subject: str, remedy: str) -> None:
         raise RunError(msg)
 
 
-def screenshot(
-    recording: Path, picture: Path, *, at: float, size: tuple[int, int] = (1600, 900), view: str | None = None
-) -> None:
+def screenshot(recording: Path, picture: Path, *, at: float, size: tuple[int, int] = (1600, 900)) -> None:
     """Draw a recording as the viewer shows it and save it as PNG, without a display.
 
     Parameters
@@ -102,8 +100,6 @@ def screenshot(
         Place of the time cursor [s].
     size : tuple of int
         Width and height of the window in points.
-    view : str, optional
-        Name of the only view to be shown; by default the whole window.
 
     Raises
     ------
@@ -114,7 +110,7 @@ def screenshot(
         started = time.monotonic()
         show(client, recording, at)
         time.sleep(max(0.0, TOASTS - (time.monotonic() - started)))
-        picture.write_bytes(settled_picture(client, view))
+        picture.write_bytes(settled_picture(client))
         errors = [f"{v.name}: {r.summary}" for v in client.get_state().views for r in v.reports]
         if errors:
             msg = f"{recording}: the viewer reports {'; '.join(errors)}"

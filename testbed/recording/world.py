@@ -11,7 +11,7 @@ import rerun as rr
 
 from testbed.pages.palette import TRUTH, rgb
 from testbed.recording.bodies import draw_bodies
-from testbed.recording.stream import FRAMES, Batch
+from testbed.recording.stream import FRAMES, INK, Batch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 DIAL = "/world/dial"
 DIAL_RANGE = float(np.radians(40.0))
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-INK = "#8a8f98"
 
 
 class Extent(NamedTuple):
@@ -53,6 +52,8 @@ class World:
         self._bodies: dict[str, Batch] = {}
         self._angles: list[FloatArray] = []
         self._index: list[NDArray[np.int64]] = []
+        self._largest, self._n_shown = 0.0, 0
+        self._scale: tuple[float, float] | None = None
         self._rotor = rotor_extent(model)
         recording.static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         draw_bodies(recording, model, colors, self._rotor.radius)
@@ -78,6 +79,9 @@ class World:
         self._index.append(index)
         # A copy: a view would keep the whole block alive.
         self._angles.append(angle.copy())
+        self._largest = max(self._largest, float(np.abs(angle).max(initial=0.0)))
+        if self._recording.live:
+            self._turn_needle()
 
     def _send(self, body: str, index: NDArray[np.int64], position: FloatArray, quaternion: FloatArray) -> None:
         # MuJoCo puts the scalar part first, Rerun last.
@@ -88,10 +92,20 @@ class World:
         """Send what is held back and draw the dial, whose magnification is known only when the largest angle is."""
         for batch in self._bodies.values():
             batch.flush()
-        index, angle = np.concatenate(self._index), np.concatenate(self._angles)
-        step, factor = dial_scale(float(np.abs(angle).max(initial=0.0)))
-        _draw_dial(self._recording, self._rotor, step, factor)
-        turned = np.column_stack((np.zeros((angle.size, 2)), np.sin(factor * angle / 2), np.cos(factor * angle / 2)))
+        self._turn_needle()
+
+    def _turn_needle(self) -> None:
+        """Add what is new of the needle; where the dial needs another scale, draw it and all of the needle in that."""
+        scale = dial_scale(self._largest)
+        if scale != self._scale:
+            self._scale, self._n_shown = scale, 0
+            _draw_dial(self._recording, self._rotor, *scale)
+        if self._n_shown == len(self._index):
+            return
+        index, angle = np.concatenate(self._index[self._n_shown :]), np.concatenate(self._angles[self._n_shown :])
+        self._n_shown = len(self._index)
+        half = scale[1] * angle / 2
+        turned = np.column_stack((np.zeros((angle.size, 2)), np.sin(half), np.cos(half)))
         self._recording.columns(f"{DIAL}/needle", index, rr.Transform3D.columns(quaternion=turned))
 
 

@@ -110,6 +110,8 @@ class RecordingWriter:
         self._fusion_names = list(fusion_names)
         self._fusion_stride = min(self._strides.values(), default=1)
         self._colors = series_colors(list(sensor_rates), self._fusion_names)
+        # The viewer draws in alphabetical order: what comes first is the widest, and is seen beside what hides it.
+        self._widths = {name: max(4.0 * 0.7**k, 1.2) for k, name in enumerate(sorted(self._fusion_names))}
         self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
         try:
             if live is None:
@@ -128,6 +130,7 @@ class RecordingWriter:
         self._channels: dict[str, Channel] = {}
         self._target: Target | None = None
         self._marks: dict[str, GateMarks] = {}
+        self._settle = settle
         self._moved = self._laid_out = False
         self._open = True
 
@@ -150,7 +153,7 @@ class RecordingWriter:
         self._write_rates(block.sensors, truth)
         for name, temperature in block.temperatures.items():
             key = f"sensors/{name}"
-            self._add(f"/{key}/temperature", temperature, self._strides[name], f"{name} [K]", key, detailed=False)
+            self._add(f"/{key}/temperature", temperature, self._strides[name], key, detailed=False)
             self._add_rate(f"/truth/{name}/drift", block.drifts[name], 1, key, detailed=False)
         self._write_estimates(block, truth[-block.start % self._fusion_stride :: self._fusion_stride])
         self._write_sights(block)
@@ -166,9 +169,9 @@ class RecordingWriter:
         stride = self._fusion_stride
         for name, estimate in block.fusion.items():
             key = f"fusion/{name}"
-            self._add_rate(f"/{key}/rate", estimate.rate, stride, key, width=2.0)
+            self._add_rate(f"/{key}/rate", estimate.rate, stride, key, width=self._widths[name])
             if reference is not None:
-                self._add_rate(f"/{key}/error", estimate.rate - reference, stride, key)
+                self._add_rate(f"/{key}/error", estimate.rate - reference, stride, key, width=1.0)
             self._add_rate(f"/{key}/std", estimate.std, stride, key, detailed=False)
             for series, values in estimate.diagnostics.items():
                 self._write_diagnostic(key, series, self._shown.of(values, unit_of(key, series)))
@@ -180,8 +183,7 @@ class RecordingWriter:
         if series.startswith(("R_", "Q_", "N_", "innovation_variance_")):
             shown[LOG + series] = _log10(values)
         for each, row in shown.items():
-            name = key.removeprefix("fusion/")
-            self._add(f"/{key}/{each}", row, self._fusion_stride, name, key, detailed=False, gaps=False)
+            self._add(f"/{key}/{each}", row, self._fusion_stride, key, detailed=False, gaps=False)
 
     def close(self) -> None:
         """Finish the file and read it back; closing twice is allowed.
@@ -263,15 +265,13 @@ class RecordingWriter:
 
     def _add_rate(self, entity: str, values: FloatArray, stride: int, key: str, **style: Any) -> None:
         """Add a block of a rate [rad/s]; `style` as of `_add`."""
-        name = f"{key.rpartition('/')[2]} [{self._shown.unit}]"
-        self._add(entity, self._shown.of(values), stride, name, key, **style)
+        self._add(entity, self._shown.of(values), stride, key, **style)
 
     def _add(
         self,
         entity: str,
         values: FloatArray,
         stride: int,
-        name: str,
         key: str,
         width: float = 1.5,
         *,
@@ -283,12 +283,14 @@ class RecordingWriter:
                 self._recording,
                 entity,
                 stride,
-                name=name,
+                # The unit is in the title of the view.
+                name=key.rpartition("/")[2],
                 color=self._colors[key],
                 width=width,
                 detailed=detailed,
                 gaps=gaps,
                 times_ns=None if self._times is None else self._times.get(clock_of(key)),
+                settle=self._settle,
             )
         self._signals[entity].write(values)
 
@@ -310,7 +312,7 @@ class RecordingWriter:
         first = -block.start % self._pose_stride
         for name, sight in block.pointing.items():
             key = f"fusion/{name}"
-            self._add(f"/pointing/{name}/residual", 1e6 * sight.residual, 1, f"{name} [µrad]", key)
+            self._add(f"/pointing/{name}/residual", 1e6 * sight.residual, 1, key)
             assert self._target is not None
             residual = sight.residual[first :: self._pose_stride]
             index = block.start + first + self._pose_stride * np.arange(residual.size)
@@ -332,7 +334,7 @@ class RecordingWriter:
         # A command of nothing would only stretch the scale of a table that turns with the Earth.
         hidden = set() if self._moved else {"/commanded/rate"}
         return blueprint(
-            entities=[entity for entity in self._signals if entity not in hidden],
+            entities={entity: signal.settled for entity, signal in self._signals.items() if entity not in hidden},
             marks=[entity for entity, marks in self._marks.items() if marks.n],
             sensors=list(self._strides),
             filters=self._fusion_names,

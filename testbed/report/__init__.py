@@ -175,7 +175,7 @@ def _figures(metrics: RunMetrics, digest: Digest) -> dict[str, Figure]:
     if digest.correlations:
         drawn["whiteness"] = whiteness_figure(digest.correlations, colors)
     if digest.adapted:
-        drawn["adapted"] = adapted_figure(digest.adapted, colors, digest.duration_s, unit)
+        drawn["adapted"] = adapted_figure(digest.adapted, colors, digest.duration_s, digest.settle_s, unit)
     if metrics.profiles:
         drawn["profile"] = profile_figure(metrics.profiles, colors, unit)
     if digest.thermal:

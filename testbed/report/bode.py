@@ -8,10 +8,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
-from testbed.pages.numbers import plain
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
@@ -127,9 +126,7 @@ def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
     for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=True):
         axes.set_ylabel(words)
         axes.grid(visible=True)
-    coherence.xaxis.set_major_locator(LogLocator(numticks=20))
-    coherence.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-    coherence.xaxis.set_minor_formatter(NullFormatter())
+    frequency_axis(coherence)
 
 
 def _handles(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> list[Line2D | Patch]:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -77,9 +77,7 @@ def budget_figure(budget: Budget, colors: Mapping[str, str], unit: Unit = DEG_S)
         axes.set_xlim(low, 1.1 * high)
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel(f"noise, input-referred, two-sided [{unit[0]}/√Hz]")
-        axes.xaxis.set_major_locator(LogLocator(numticks=20))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        frequency_axis(axes)
         decade_axis(axes)
         axes.grid(visible=True)
         arrange(figure, [*handles])

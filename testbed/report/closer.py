@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def closer_views(digest: Digest, colors: Mapping[str, str], unit: Unit) -> list[dict[str, Any]]:
-    """Return what can be looked at: the sensors, the filters, the filters' errors, each beside the truth.
+    """Return what can be looked at: the sensors and the filters, each over the truth, and the filters' errors, each in
+    a chart of its own, for they would hide each other.
 
     Parameters
     ----------
@@ -31,24 +32,27 @@ def closer_views(digest: Digest, colors: Mapping[str, str], unit: Unit) -> list[
     shown_errors = digest.filter_errors if digest.has_truth else {}
     errors = {f"fusion/{name}": trace.close for name, trace in shown_errors.items() if trace.close is not None}
     views = [
-        ("Sensors", f"rate [{unit[0]}]", _beside_truth(rates, "sensors/")),
-        ("Filters", f"rate [{unit[0]}]", _beside_truth(rates, "fusion/")),
-        ("Errors of the filters", f"error [{unit[0]}]", errors),
+        ("Sensors", f"rate [{unit[0]}]", [_over_truth(rates, "sensors/")]),
+        ("Filters", f"rate [{unit[0]}]", [_over_truth(rates, "fusion/")]),
+        ("Errors of the filters", f"error [{unit[0]}]", [{group: one} for group, one in errors.items()]),
     ]
     return [
         {
             "title": title,
             "label": words,
-            "traces": [_trace(group, one, colors[group], unit[1] * DEGREE) for group, one in shown.items()],
+            "charts": [
+                [_trace(group, one, colors[group], unit[1] * DEGREE) for group, one in shown.items()]
+                for shown in charts
+            ],
         }
-        for title, words, shown in views
-        if set(shown) - {"truth"}
+        for title, words, charts in views
+        if any(set(shown) - {"truth"} for shown in charts)
     ]
 
 
-def _beside_truth(rates: Mapping[str, Envelope], kind: str) -> dict[str, Envelope]:
+def _over_truth(rates: Mapping[str, Envelope], kind: str) -> dict[str, Envelope]:
     beside = {"truth": rates["truth"]} if "truth" in rates else {}
-    return {group: one for group, one in rates.items() if group.startswith(kind)} | beside
+    return beside | {group: one for group, one in rates.items() if group.startswith(kind)}
 
 
 def _trace(group: str, envelope: Envelope, color: str, scale: float) -> dict[str, Any]:

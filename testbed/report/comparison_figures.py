@@ -8,10 +8,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
-from testbed.pages.numbers import plain
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
@@ -125,9 +124,7 @@ def spectra_beside(
         axes.set_yscale("log")
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel(f"error root density, two-sided [{unit[0]}/√Hz]")
-        axes.xaxis.set_major_locator(LogLocator(numticks=20))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        frequency_axis(axes)
         decade_axis(axes)
         freq = np.concatenate([digest.filter_errors[name].freq_hz for digest in digests for name in names])
         if freq.size:
@@ -136,7 +133,7 @@ def spectra_beside(
         handles: list[Line2D | Patch] = [
             Line2D(
                 [], [], color=colors[group], linewidth=2.2, label=label(group),
-                **(marked(mark, colors[group]) | {"linestyle": "-"}),
+                **on_area(mark, colors[group]),
             )
             for group, mark in marks.items()
         ]  # fmt: skip

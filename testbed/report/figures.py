@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, HOURS_FROM, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
+from testbed.pages.decades import decade_axis, frequency_axis
 from testbed.pages.numbers import plain, significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
@@ -99,7 +99,7 @@ def rates_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = DEG_S) 
 
 def _in_legend(marks: Mapping[str, Mark], colors: Mapping[str, str], group: str) -> dict[str, Any]:
     """Return how the line of a filled area is in the legend: with its mark; the truth has none."""
-    return marked(marks[group], colors[group]) | {"linestyle": "-"} if group in marks else {"linestyle": DASHED}
+    return on_area(marks[group], colors[group]) if group in marks else {"linestyle": DASHED}
 
 
 def _dot_command(axes: Axes, digest: Digest, scale: float) -> bool:
@@ -282,9 +282,7 @@ def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     axes.set_xlabel("frequency [Hz]")
     of = "error" if digest.has_truth else "rate"
     axes.set_ylabel(f"{of} root density, two-sided [{unit[0]}/√Hz]")
-    axes.xaxis.set_major_locator(LogLocator(numticks=20))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    frequency_axis(axes)
     decade_axis(axes)
     axes.grid(visible=True)
     shown = [trace.freq_hz for trace in by_group(digest).values() if trace.freq_hz.size]
@@ -294,9 +292,11 @@ def _frame_spectrum(axes: Axes, digest: Digest, unit: Unit) -> None:
     lines = [freq for freq in digest.line_freq_hz if low <= freq <= high]
     for freq in lines:
         axes.axvline(freq, color=INK, linewidth=0.8, alpha=0.45, linestyle=(0, (1, 2)), zorder=0.5)
+    # Beside others there is no room for the unit, which the axis has.
+    unit_of = " Hz" if len(lines) <= 2 else ""
     for freq in lines if len(lines) <= MAX_LABELLED_LINES else []:
         axes.annotate(
-            f"{plain(freq)} Hz", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
+            f"{plain(freq)}{unit_of}", (freq, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
 

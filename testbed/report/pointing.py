@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
-from testbed.pages.numbers import plain, significant
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked, on_area
+from testbed.pages.decades import decade_axis, frequency_axis
+from testbed.pages.numbers import significant
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.runs.table import window_text
@@ -120,7 +120,9 @@ def sight_budget_figure(sights: Mapping[str, PointingMetrics]) -> Figure:
         axes.set_xlabel("share of the residual's variance [%]; all of a bar add up to 100")
         axes.grid(visible=True, axis="x")
         arrange(figure, [Patch(label=part.replace("_", " "), **_area(part)) for part in parts])
-        figure.subplots_adjust(left=1.35 / WIDTH_IN)
+        # Names stand on the left, 0.075 in a letter.
+        longest = max(map(len, known), default=0)
+        figure.subplots_adjust(left=max(1.35, 0.25 + 0.075 * longest) / WIDTH_IN)
     return figure
 
 
@@ -164,15 +166,13 @@ def sight_curves_figure(sights: Mapping[str, PointingMetrics], colors: Mapping[s
             look = {"color": color, **marked(mark, color, len(sight.curves.get("frequency_hz", [])))}
             _curves(above, below, sight, "residual", {**look, "linewidth": 2.0, "linestyle": "-"})
             _curves(above, below, sight, "knowledge", {**look, "linewidth": 1.3, "linestyle": _DOTTED})
-            style = marked(mark, color) | {"linestyle": "-"}
+            style = on_area(mark, color)
             handles.append(Line2D([], [], color=color, linewidth=2.2, label=label(name), **style))
         handles.append(Line2D([], [], color=INK, linewidth=1.3, linestyle=_DOTTED, label="knowledge"))
         above.set_ylabel("density, two-sided [µrad/√Hz]")
         below.set_ylabel("rms below the frequency [µrad]")
         below.set_xlabel("frequency [Hz]")
-        below.xaxis.set_major_locator(LogLocator(numticks=20))
-        below.xaxis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
-        below.xaxis.set_minor_formatter(NullFormatter())
+        frequency_axis(below)
         for axes, decades in ((above, 6.0), (below, 3.5)):
             _last_decades(axes, decades)
             decade_axis(axes)

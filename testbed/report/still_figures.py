@@ -8,10 +8,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from testbed.pages.axes import WIDTH_IN, arrange, decade_axis, label, marked
-from testbed.pages.numbers import decade, significant
+from testbed.pages.axes import WIDTH_IN, arrange, label, marked
+from testbed.pages.decades import decade_axis, label_powers
+from testbed.pages.numbers import significant
 from testbed.pages.palette import DASHES, Mark, mix, series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.report.figures import DEG_S, Unit, by_group
@@ -72,9 +72,7 @@ def errors_allan_figure(digest: Digest, colors: Mapping[str, str], unit: Unit = 
             style = marked(marks[group], color, curve.tau.size)
             handles += axes.plot(curve.tau, middle, color=color, linewidth=width, label=label(group), **style)
         axes.set_ylabel(f"Allan deviation of the {'error' if digest.has_truth else 'rate'} [{unit[0]}]")
-        axes.xaxis.set_major_locator(LogLocator(numticks=20))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        label_powers(axes.xaxis, most=20)
         decade_axis(axes)
         axes.grid(visible=True)
         arrange(figure, handles)

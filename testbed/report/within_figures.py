@@ -9,20 +9,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, decade_axis, draw, label, marked, time_axis
+from testbed.pages.axes import DEGREE, WIDTH_IN, arrange, draw, label, marked, on_area, time_axis
+from testbed.pages.decades import decade_axis
 from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 from testbed.report.figures import DEG_S, Unit
 from testbed.report.within import LAGS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
 
     from testbed.pages.envelope import Envelope
     from testbed.report.within import Correlations
+    from testbed.signals import FloatArray
 
 _NAMES = {"R_": "R of", "N_": "N of", "gated_": "gated readings of", "frequency_": "frequency that is seen by"}
 # What is no variance of a rate: its unit.
@@ -32,10 +34,14 @@ _DECADES = 6.0
 
 
 def adapted_figure(
-    traces: Mapping[str, Mapping[str, Envelope]], colors: Mapping[str, str], duration_s: float, unit: Unit = DEG_S
+    traces: Mapping[str, Mapping[str, Envelope]],
+    colors: Mapping[str, str],
+    duration_s: float,
+    settle_s: float,
+    unit: Unit = DEG_S,
 ) -> Figure:
     """Draw what the filters adapted over time, a panel for each quantity: variances and frequencies on a logarithmic
-    axis.
+    axis, whose scale is set by what comes after settle.
 
     Parameters
     ----------
@@ -43,8 +49,8 @@ def adapted_figure(
         By diagnostic and filter, variances in rad^2/s^2.
     colors : Mapping
         Group (``fusion/kalman``, ...) to color.
-    duration_s : float
-        Length of the run [s].
+    duration_s, settle_s : float
+        Length of the run, and start of the part that is judged [s].
     unit : tuple of str and float, optional
         Unit of the rates, and what deg/s is multiplied by for it.
     """
@@ -64,7 +70,7 @@ def adapted_figure(
             axes.set_ylabel(plain or f"({unit[0]})²")
             axes.grid(visible=True)
             if plain != "readings":
-                _logarithmic(axes, by_filter.values(), scale)
+                _logarithmic(axes, by_filter.values(), scale, settle_s)
         panels[-1].set_xlim(0.0, duration_s)
         time_axis(panels[-1], duration_s)
         arrange(figure, _handles(filters, colors))
@@ -78,15 +84,25 @@ def _title(key: str) -> str:
     return "Q, variance that a step adds to the rate"
 
 
-def _logarithmic(axes: Axes, envelopes: Iterable[Envelope], scale: float) -> None:
-    """Give the axis decades, down to the lowest value above zero but not below what six of them show."""
-    values = scale * np.concatenate([ends for one in envelopes for ends in (one.low, one.high)])
-    known = values[np.isfinite(values) & (values > 0.0)]
+def _logarithmic(axes: Axes, envelopes: Collection[Envelope], scale: float, settle_s: float) -> None:
+    """Give the axis decades, one at the least: of the values after settle, or of all where there is none after it, down
+    to the lowest above zero but not below what six of them show.
+    """
+    known = _above_zero(envelopes, settle_s)
+    known = scale * (known if known.size else _above_zero(envelopes, 0.0))
     if known.size:
         low, high = max(float(known.min()), float(known.max()) * 10.0**-_DECADES), float(known.max())
+        margin = max(1.6, np.sqrt(10.0 * low / high))
         axes.set_yscale("log")
-        axes.set_ylim(low / 1.6, high * 1.6)
+        axes.set_ylim(low / margin, high * margin)
         decade_axis(axes)
+
+
+def _above_zero(envelopes: Iterable[Envelope], from_s: float) -> FloatArray:
+    """Return the extremes above zero, of the bins from `from_s` on [s]."""
+    ends = [side[one.time >= from_s] for one in envelopes for side in (one.low, one.high)]
+    values = np.concatenate(ends)
+    return values[np.isfinite(values) & (values > 0.0)]
 
 
 def _handles(filters: Iterable[str], colors: Mapping[str, str]) -> list[Line2D | Patch]:
@@ -94,7 +110,7 @@ def _handles(filters: Iterable[str], colors: Mapping[str, str]) -> list[Line2D |
     return [
         Line2D(
             [], [], color=colors[group], linewidth=2.2, label=label(group),
-            **(marked(mark, colors[group]) | {"linestyle": "-"}),
+            **on_area(mark, colors[group]),
         )
         for group, mark in marks.items()
     ]  # fmt: skip

@@ -9,9 +9,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from testbed.pages.numbers import decade, plain
+from testbed.pages.decades import label_powers
+from testbed.pages.numbers import plain
 from testbed.pages.svg import INK, STYLE
 from testbed.runs.atomic import write_bytes
 
@@ -59,9 +60,7 @@ def logarithmic(axes: Axes, which: str) -> None:
     for name, axis, scale in (("x", axes.xaxis, axes.set_xscale), ("y", axes.yaxis, axes.set_yscale)):
         if name in which:
             scale("log")
-            axis.set_major_locator(LogLocator(numticks=9))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: decade(value)))
-            axis.set_minor_formatter(NullFormatter())
+            label_powers(axis, most=9)
 
 
 def in_time(axes: Axes, t: FloatArray) -> None:

@@ -54,7 +54,7 @@ class RunFolder:
             with alone_in(self._place.parent):
                 found = in_the_way(self._place)
             if found:
-                raise ScenarioError([Problem(f"{found}: choose another --out, or move it away", file=str(self.target))])
+                raise _taken(found, self.target)
             self._place.parent.mkdir(parents=True, exist_ok=True)
             self.path = self._stack.enter_context(beside(self._place, folder=True)) / "run"
             self.path.mkdir()
@@ -96,6 +96,17 @@ class RunFolder:
         put(self.path, free)
         msg = f"{self.target}: {found}, since the run began; the finished run is in {free}"
         raise RunError(msg)
+
+
+def check_free(target: Path) -> None:
+    """Raise ScenarioError if a run folder cannot be put at `target`, for who has long to work before it makes one."""
+    found = in_the_way(Path(os.path.realpath(target)))
+    if found:
+        raise _taken(found, target)
+
+
+def _taken(found: str, target: Path) -> ScenarioError:
+    return ScenarioError([Problem(f"{found}: choose another --out, or move it away", file=str(target))])
 
 
 def in_the_way(place: Path) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from testbed.runs.block import RunBlock
+    from testbed.runs.block import PlayedBlock, RunBlock
 
 # What is left of a diagnostic, those that stay at one value aside; a rate is stored as it is.
 _KEPT = 0.5
@@ -28,7 +28,7 @@ _SPARE = 1.05
 
 
 def disk_bytes(
-    block: RunBlock,
+    block: RunBlock | PlayedBlock,
     rates: Mapping[str, float],
     n_time: int,
     detail: tuple[float, float],
@@ -38,7 +38,7 @@ def disk_bytes(
 
     Parameters
     ----------
-    block : RunBlock
+    block : RunBlock or PlayedBlock
         Any of its blocks: what signals there are. One that stays at one value in it is taken to do so to the end.
     rates : mapping of str to float
         Of ``base`` and of every sensor and filter [Hz].

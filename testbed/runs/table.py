@@ -50,8 +50,12 @@ def error_cells(source: SourceMetrics, scale: float) -> list[str]:
     def shown(rates: tuple[float | None, ...]) -> list[str]:
         return [number(None if rate is None else scale * rate) for rate in rates]
 
-    over = [NOTHING if ratio is None else f"{ratio:.1f}" for ratio in ratios]
-    return [*shown(errors), *over, *shown((source.mean_deg_s, source.spread_deg_s))]
+    return [*shown(errors), *map(ratio_text, ratios), *shown((source.mean_deg_s, source.spread_deg_s))]
+
+
+def ratio_text(value: float | None) -> str:
+    """Return a ratio of two errors in three digits, as the report has it; a dash for None."""
+    return NOTHING if value is None else f"{value:.3g}"
 
 
 def number(value: float | None) -> str:

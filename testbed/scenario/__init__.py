@@ -1,5 +1,6 @@
 """From YAML to a validated scenario, and back."""
 
-from testbed.scenario.model import Bound, FilterSpec, Frame, Scenario
+from testbed.scenario.frame import Frame
+from testbed.scenario.model import Bound, FilterSpec, Scenario
 
 __all__ = ["Bound", "FilterSpec", "Frame", "Scenario"]

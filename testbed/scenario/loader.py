@@ -18,9 +18,10 @@ from testbed.pointing.parameters import PointingParameters, window_key
 from testbed.scenario.beliefs import preset_belief
 from testbed.scenario.checks import cross_check
 from testbed.scenario.entries import is_name, kind_of, mapping
+from testbed.scenario.frame import Frame
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake, unresolved
-from testbed.scenario.model import Bound, Frame, Scenario
+from testbed.scenario.model import Bound, Scenario
 from testbed.scenario.pointing import WINDOW_METRICS
 from testbed.sensors import SENSORS, with_preset
 from testbed.sensors.base import Sensor

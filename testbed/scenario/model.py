@@ -6,9 +6,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from pydantic import BaseModel, Field
+from typing import TYPE_CHECKING, Any
 
 from testbed.document import Document
 from testbed.fusion import FILTERS
@@ -17,11 +15,10 @@ from testbed.inputs.plain import plain_tree
 from testbed.inputs.plugins import Plugins, load_plugins, running
 from testbed.models.motion import MotionProfile, watched
 from testbed.models.motions import MOTIONS
-from testbed.models.temperature import ROOM, TemperatureProfile
-from testbed.parts import Part
 from testbed.scenario.edits import edited
+from testbed.scenario.resolved import dump, resolved_expectations, resolved_fusion
 from testbed.signals import BASE_RATE_HZ, random_stream
-from testbed.units import Duration, Frequency, PositiveDuration, rate_unit
+from testbed.units import rate_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -33,65 +30,12 @@ if TYPE_CHECKING:
     from testbed.models.turntable.floor import FloorMotion
     from testbed.models.turntable.parameters import TurntableParameters
     from testbed.pointing.parameters import PointingParameters
+    from testbed.scenario.frame import Frame
     from testbed.sensors.base import Sensor
     from testbed.units import RateUnit
 
 # Base samples of the default detail, at the least.
 _FEWEST_DETAIL = 1000
-# What the signed 64 bits of run.nc hold.
-MOST_SEED = 2**63 - 1
-
-
-Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
-
-
-class Frame(Part):
-    """The keys of a scenario that are no parts of their own.
-
-    Parameters
-    ----------
-    name : str
-        Names the run folder.
-    description : str, optional
-        What the experiment shows.
-    seed : int, optional
-        Seed of every random stream.
-    truth_seed : int, optional
-        Seed of what the table really does, random motions and floor, instead of `seed`: then `seed` varies the noise of
-        the sensors alone.
-    duration : float
-        Length of the run [s].
-    fusion_from : float, optional
-        The filters see the readings from here on [s], a time at which every sensor has one; then they do not know that
-        the table has been at rest, unless an entry says ``start: rest``.
-    settle : float, optional
-        Metrics start here [s]; with the filters if not given.
-    ramp_in : float, optional
-        Smooth ramp-in of the motion [s].
-    temperature : TemperatureProfile, optional
-        Of every instrument with temperature terms, such as ``25 degC``, or from `start` to `stop` over a time [K].
-    bandwidth : float, optional
-        Bandwidth W of the noise floor in the metrics [Hz].
-    no_rate_below : float, optional
-        The signal is known to have nothing below this [Hz]: then the metrics have a floor with that prior too.
-    detail : tuple of two floats, optional
-        From when to when the recording holds every sample [s]; two seconds after `settle` if not given, at least 1000
-        samples.
-    """
-
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
-    description: str = ""
-    seed: Seed = 0
-    truth_seed: Seed | None = None
-    duration: PositiveDuration
-    fusion_from: Duration = 0.0
-    settle: Duration = Field(default_factory=lambda given: float(given.get("fusion_from", 0.0)))
-    ramp_in: Duration = 0.5
-    temperature: TemperatureProfile = ROOM
-    bandwidth: Frequency = 1000.0
-    no_rate_below: Frequency | None = None
-    detail: tuple[Duration, Duration] | None = None
-
 
 METRICS = (
     "rmse_deg_s",
@@ -347,7 +291,7 @@ class Scenario:
             },
             "fusion": resolved_fusion(self.fusion),
             **({} if self.pointing is None else {"pointing": dump(self.pointing)}),
-            "expect": _expectations(self.expect),
+            "expect": resolved_expectations(self.expect),
         }
 
 
@@ -356,47 +300,3 @@ def _built(tree: Tree, folder: Path, file: str, plugins: Plugins, *, allow_outsi
     from testbed.scenario.loader import read_document
 
     return read_document(Intake(Document(file, tree=tree), folder.resolve(), plugins, allow_outside))
-
-
-def dump(part: BaseModel, folder: Path | None = None) -> dict[str, Any]:
-    """Return a part as a mapping with SI units that validates to the same part; what is unset by default and unset here
-    is left out.
-
-    Parameters
-    ----------
-    part : BaseModel
-        The part.
-    folder : Path, optional
-        Paths into it are relative.
-    """
-    written = part.model_dump(mode="json", context={"border": True, "folder": folder})
-    fields = type(part).model_fields
-    return {key: value for key, value in written.items() if value is not None or fields[key].default is not None}
-
-
-def resolved_fusion(specs: Mapping[str, FilterSpec]) -> dict[str, Any]:
-    """Return the part `fusion` of a scenario or a replay as a mapping with SI units, which loads to the same again.
-
-    Parameters
-    ----------
-    specs : mapping of str to FilterSpec
-        The filters.
-    """
-    return {name: {"type": spec.type, "belief": _belief(spec), **_parameters(spec)} for name, spec in specs.items()}
-
-
-def _belief(spec: FilterSpec) -> dict[str, Any] | str:
-    """Return what a filter believes; the exact belief as the word, since the sensors stand beside it."""
-    word = declared(spec.belief)
-    return word if word == "exact" else {name: dump(one) for name, one in spec.belief.items()}
-
-
-def _parameters(spec: FilterSpec) -> dict[str, Any]:
-    return dump(spec.parameters) if isinstance(spec.parameters, BaseModel) else dict(spec.parameters)
-
-
-def _expectations(bounds: tuple[Bound, ...]) -> dict[str, dict[str, str]]:
-    table: dict[str, dict[str, str]] = {}
-    for bound in bounds:
-        table.setdefault(bound.subject, {})[bound.metric] = f"{bound.relation} {bound.limit!r}"
-    return table

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, cast
 from testbed.document import Document
 from testbed.inputs.plugins import load_plugins
 from testbed.scenario.entries import mapping
+from testbed.scenario.frame import Frame
 from testbed.scenario.fusion import Fusion
 from testbed.scenario.intake import Intake
 from testbed.scenario.loader import load_scenario
-from testbed.scenario.model import Frame, Scenario
+from testbed.scenario.model import Scenario
 from testbed.units import parse
 
 if TYPE_CHECKING:

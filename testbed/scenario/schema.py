@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from testbed.fusion import FILTERS
 from testbed.models.motions import MOTIONS
 from testbed.models.turntable import TurntableParameters
 from testbed.parts import preset_names, resolve
 from testbed.pointing.parameters import PointingParameters
-from testbed.scenario.model import Frame
+from testbed.scenario.frame import Frame
 from testbed.sensors import SENSORS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _BELIEF = (
     "What the filter believes of the sensors: the name of a shipped belief, a file of one beside the scenario, 'exact' "
@@ -31,11 +34,24 @@ def schema() -> dict[str, Any]:
         definitions.update({name: _optional(nested) for name, nested in raw.pop("$defs", {}).items()})
         return raw
 
-    frame = part(Frame)
+    properties = _properties(part)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Scenario of the testbed",
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["name", "duration", "motion"],
+        "properties": properties,
+        "$defs": definitions,
+    }
+
+
+def _properties(part: Callable[[type[Any]], dict[str, Any]]) -> dict[str, Any]:
+    """Return the keys of a scenario, each part by what makes its schema."""
     turntable = part(TurntableParameters)
     turntable["properties"]["preset"] = {"enum": preset_names("testbed.models")}
-    properties = {
-        **frame["properties"],
+    return {
+        **part(Frame)["properties"],
         "turntable": _optional(turntable),
         "motion": {
             "type": "array",
@@ -61,15 +77,6 @@ def schema() -> dict[str, Any]:
                 "additionalProperties": {"anyOf": [_BOUND, {"type": "object", "additionalProperties": _BOUND}]},
             },
         },
-    }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Scenario of the testbed",
-        "type": "object",
-        "additionalProperties": False,
-        "required": ["name", "duration", "motion"],
-        "properties": properties,
-        "$defs": definitions,
     }
 
 

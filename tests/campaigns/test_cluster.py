@@ -55,15 +55,15 @@ def until(condition):
 
 
 class Cluster:
-    """A scheduler and two workers of one thread, each a process of its own, that find each other by a file."""
+    """A scheduler and workers of one thread, each a process of its own, that find each other by a file."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, workers):
         self._file = folder / f"scheduler-{time.monotonic_ns()}.json"
         common = ["--scheduler-file", str(self._file), "--host", "127.0.0.1", "--no-dashboard"]
         self.scheduler = self._start("dask_scheduler", *common, "--port", "0")
         until(self._file.exists)
         each = ["--nthreads", "1", "--no-nanny", "--local-directory", str(folder)]
-        self.workers = [self._start("dask_worker", *common, *each) for _ in range(2)]
+        self.workers = [self._start("dask_worker", *common, *each) for _ in range(workers)]
 
     @staticmethod
     def _start(name, *words):
@@ -83,8 +83,8 @@ class Cluster:
 
 
 @contextlib.contextmanager
-def cluster(folder):
-    one = Cluster(folder)
+def cluster(folder, workers=2):
+    one = Cluster(folder, workers)
     try:
         yield one
     finally:
@@ -121,7 +121,7 @@ def test_a_campaign_goes_on_after_its_scheduler_was_lost(whole, tmp_path):
     assert "run the same command again" in said
     assert before <= finished(out)
     assert len(finished(out)) < POINTS * SEEDS, "the campaign was over before anything was killed"
-    with cluster(tmp_path) as found:
+    with cluster(tmp_path, workers=1) as found:
         again = launched(path, out, "--scheduler", found.address)
         _, said = again.communicate(timeout=PATIENCE)
         assert again.returncode == 0, said

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from testbed.campaigns.axes import Axis, jointly_drawn, values_of
+from testbed.campaigns.rows import unit_at
 from testbed.campaigns.study import load_study
 from testbed.errors import ScenarioError
 
@@ -144,3 +145,20 @@ def test_a_list_of_nothing_is_refused_in_our_words(tmp_path):
     path = written(tmp_path, "vary: {duration: {list: []}}\n")
     with pytest.raises(ScenarioError, match=r"vary\.duration\.list: expected at least 1 entry, got 0: add some"):
         load_study(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        ("motion.0.sine.frequency", "Hz"),
+        ("settle", "s"),
+        ("sensors.mhd_ars.channel.height", "m"),
+        ("sensors.mems_gyro.angle_random_walk", "rad*s^-0.5"),
+        ("fusion.kalman.order", "-"),
+        ("motion.3.sine.frequency", "-"),
+        ("sensors.mems_gyro", "-"),
+    ],
+)
+def test_a_value_at_a_key_has_the_unit_of_its_part(tmp_path, key, unit):
+    scenario = load_study(written(tmp_path, "seeds: 1\n")).cases[0].scenario
+    assert unit_at(scenario, key) == unit

@@ -107,7 +107,9 @@ def test_what_is_not_safe_stands_though_it_was_asked_to_be_put_right(spoken, sta
     ("words", "message"),
     [
         (("bench.csv",), "--filter: expected at least one filter"),
-        (("bench.csv", "--filter", "kalman,"), "expected names with commas between them"),
+        (("bench.csv", "--filter", "kalman,"), "--filter: expected one or more with commas between them"),
+        (("bench.csv", "--filter", "kalman", "--lines", "1,,2"), "--lines: expected one or more with commas"),
+        (("bench.csv", "--filter", "kalman", "--outputs", "metrics,"), "--outputs: expected one or more with commas"),
         (("bench.csv", "--filter", "calman", "--filter", "kalman"), "unknown filter 'calman'"),
         (("bench.csv", "--filter", "calman"), "unknown filter 'calman'"),
         (("--filter", "kalman"), "LOG: expected a recording"),

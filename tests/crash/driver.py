@@ -1,9 +1,9 @@
 """Kills, full disks and read-only folders, many times over; says what was not whole afterwards.
 
-``python -m tests.crash.driver kill run 200 SEED FOLDER`` (or report, training, replayed, exported, identified, swept),
-``... disk 20 FOLDER``. Each action
+``python -m tests.crash.driver kill run=200,report=200 SEED FOLDER`` (or training, replayed, exported, identified,
+swept), ``... disk 20 FOLDER``. Each action
 runs in a fork of this process, which has the libraries loaded and no thread. Prints one JSON object: how many ended
-how, and the faults.
+how, and the faults; of kills by action.
 """
 
 from __future__ import annotations
@@ -241,7 +241,11 @@ def kill(name, number, seed, folder):
         moment = length * (choice.uniform(0.8, 1.2) if i % 2 else choice.uniform(0.0, 1.0))
         time.sleep(moment)
         os.kill(child, signal.SIGKILL)
-        ends[end(child)] += 1
+        ended = end(child)
+        ends[ended] += 1
+        if ended == "status 0":
+            # It took no longer than that: what was measured before may have been on a busier machine.
+            length = min(length, moment)
         faults += checked(scene, f"{name} {i}, killed after {moment:.3f} s")
     if end(begin(getattr(scene, name), 0, said)) != "status 0":
         faults.append("the last one, undisturbed, failed")
@@ -297,7 +301,8 @@ def disk(number, folder):
 if __name__ == "__main__":
     what, *given = sys.argv[1:]
     if what == "kill":
-        found = kill(given[0], int(given[1]), int(given[2]), Path(given[3]))
+        numbers = {name: int(number) for name, _, number in (one.partition("=") for one in given[0].split(","))}
+        found = {name: kill(name, number, int(given[1]), Path(given[2]) / name) for name, number in numbers.items()}
     else:
         found = disk(int(given[0]), Path(given[1]))
     print(json.dumps(found))

@@ -137,9 +137,24 @@ def test_what_is_wrong_is_found_at_its_place(tmp_path, old, new, key, words):
     assert found[key].line is not None
 
 
-def test_nothing_asked_is_an_error(tmp_path):
+def test_everything_wrong_is_found_at_once(tmp_path):
+    """The parts of the requirement, the scenario in it, and an entry that is no mapping, each at its line."""
     path = tmp_path / "bad.yaml"
-    path.write_text(SHORT.split("rpe_urad", maxsplit=1)[0])
+    text = SHORT.replace("duration: 6 s", "duration: 6").replace("cost: 30", "cost: x").replace("10 Hz", "10 m")
+    path.write_text(
+        text.replace("wideband: {belief: identified}", "wideband: 5").replace("mirrors:", "mirrors: []\nx:")
+    )
+    with pytest.raises(testbed.ScenarioError) as caught:
+        read_requirement(path)
+    keys = ["duration", "sensors.mhd_ars.cost", "fusion.wideband", "trackers.coarse.bandwidth", "mirrors", "x"]
+    assert [problem.key for problem in caught.value.problems] == keys
+    assert all(problem.line for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("asked", ["", "rpe_urad:\n"])
+def test_nothing_asked_is_an_error(tmp_path, asked):
+    path = tmp_path / "bad.yaml"
+    path.write_text(SHORT.split("rpe_urad", maxsplit=1)[0] + asked)
     with pytest.raises(testbed.ScenarioError, match="nothing is asked"):
         read_requirement(path)
 
@@ -208,3 +223,9 @@ def test_the_chosen_scenario_needs_no_file_beside_the_requirement(tmp_path):
     again = testbed.load_scenario(write_chosen(asked, one, tmp_path / "out"))
     at = np.arange(100) / 1000.0
     assert_allclose(again.profile().rate(at), asked.scenario.profile().rate(at), rtol=1e-12)
+    # A file of the user's that has the copy's name stays; one's own copy is no hindrance.
+    write_chosen(asked, one, tmp_path / "out")
+    (tmp_path / "out" / "motion_0.csv").write_text("mine")
+    with pytest.raises(testbed.ScenarioError, match=r"motion_0\.csv: a copy of shake\.csv would replace this file"):
+        write_chosen(asked, one, tmp_path / "out")
+    assert (tmp_path / "out" / "motion_0.csv").read_text() == "mine"

@@ -60,6 +60,17 @@ def test_a_record_of_an_unknown_start_begins_anywhere_in_the_motion() -> None:
     assert begun[0] == 0.0
 
 
+@pytest.mark.parametrize(("name", "own"), [("kalman", example.fixed(8.0, 2)), ("wideband", {})])
+def test_seeds_side_by_side_have_the_errors_that_each_has_alone(name: str, own: dict[str, object]) -> None:
+    records = [example.record([example.sine(10.0)], 0.8, seed, "unknown") for seed in (33, 34)]
+    found = example.errors_and_claims(name, records, "unknown", **own)
+    for (rate, z), one in zip(records, found, strict=True):
+        block = example.estimate(name, z, sample_rate_hz=example.RATES, belief=example.BELIEF, verdict=False, **own)
+        for k, part in enumerate((slice(4000, 8000), slice(8000, None))):
+            wanted = np.degrees([example.rms((block.rate - rate)[part]), example.rms(block.std[part])])
+            np.testing.assert_allclose(one[:, k], wanted, rtol=1e-9)
+
+
 def test_the_wheel_is_that_of_the_scenario() -> None:
     motions, _ = example.signals()["wheel"]
     assert motions[0].lines() == pytest.approx([40.0, 80.0, 120.0, 208.0], rel=1e-9)

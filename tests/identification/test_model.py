@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -26,11 +28,11 @@ def measured(true, rng, std=1e-3):
 
 @pytest.mark.oracle
 def test_coefficients_and_delay_scatter_as_their_covariance_says():
-    """Sum over 30 fits of the squared error over the covariance: chi-square, once in 10 000 outside."""
+    """Sum over 15 fits of the squared error over the covariance: chi-square, once in 10 000 outside."""
     b, a = np.array(NUMERATOR) / DENOMINATOR[0], np.array(DENOMINATOR) / DENOMINATOR[0]
     true = transfer(b, a, FREQ) * np.exp(-2j * np.pi * FREQ * 0.35e-3)
     total, n = 0.0, 0
-    for seed in range(30):
+    for seed in range(15):
         fit = fit_model(measured(true, np.random.default_rng(seed)))
         if fit.denominator.size != 3 or fit.free != 1 or not fit.delayed:
             continue
@@ -38,7 +40,7 @@ def test_coefficients_and_delay_scatter_as_their_covariance_says():
         total += off @ np.linalg.solve(fit.covariance, off)
         n += off.size
     # Bayes' criterion takes one coefficient too many in about one fit of twenty, for each that it may.
-    assert n >= 20 * 4
+    assert n >= 10 * 4
     assert chi2.ppf(5e-5, n) < total < chi2.isf(5e-5, n)
 
 
@@ -68,6 +70,34 @@ def test_a_sensor_that_sees_a_constant_is_not_made_blind(rng):
     """Its slow pole and zero, far below the band, would be met as well by a zero at s = 0."""
     true = transfer([154.537, 15.626], [5.2175, 148.0, 15.444], FREQ)
     assert fit_model(measured(true, rng, std=1e-2)).numerator[-1] != 0.0
+
+
+BLIND = np.array([2200.0, 0.0]) / 0.255, np.array([0.255, 2178.0, 33900.0]) / 0.255
+
+
+def constant_std(b, a, std):
+    r"""Return the standard deviation of the numerator's constant term by the Cramer-Rao bound: all coefficients free,
+    :math:`\partial G / \partial b_j = s^j / D`, :math:`\partial G / \partial a_j = -G s^j / D`, in points of two parts
+    each of variance std^2 / 2.
+    """
+    s = 2j * np.pi * FREQ
+    D = np.polyval(a, s)
+    G = np.polyval(b, s) / D
+    jacobian = np.stack([s / D, 1.0 / D, -G * s / D, -G / D], axis=1)
+    rows = np.concatenate([jacobian.real, jacobian.imag]) * np.sqrt(2.0) / std
+    size = np.linalg.norm(rows, axis=0)
+    return float(np.sqrt(np.linalg.inv(rows.T @ rows / np.outer(size, size))[1, 1]) / size[1])
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("deviations", "counts"), [(3.9, False), (4.1, True)])
+def test_a_constant_term_counts_from_four_standard_deviations_on(rng, deviations, counts):
+    """Without an error in the response the estimate is the true one. Bayes' criterion alone takes it from two on."""
+    (b, a), std = BLIND, 1e-3
+    seen = deviations * constant_std(b, a, std)
+    true = transfer(b + np.array([0.0, seen]), a, FREQ)
+    found = fit_model(replace(measured(true, rng, std), response=true)).numerator[-1]
+    assert found == (pytest.approx(seen, rel=1e-3, abs=0.0) if counts else 0.0)
 
 
 def test_one_frequency_is_too_few():

@@ -125,3 +125,22 @@ def test_channels_of_the_same_rows_have_one_clock(tmp_path):
     found = testbed.identify_sensors(log, "laser", ["gyro"])[0]
     assert found.measured.response.clock.std == 0.0
     assert found.belief.delay == pytest.approx(one.delay, rel=0.0, abs=20e-6)
+
+
+def test_noise_that_is_too_small_beside_the_references_is_said(tmp_path, rng):
+    """Of an output without noise, and of one with some, beside a reference that is as noisy as that one."""
+    n, lines = 10_000, (3.0, 7.0, 19.0, 43.0, 97.0, 151.0)
+    rate = sum(np.sin(2.0 * np.pi * freq * np.arange(n) / 500.0) for freq in lines)
+    columns = rate + np.array([[1e-2], [1e-6], [1e-2]]) * rng.standard_normal((3, n))
+    head = "laser [rad/s],quiet [rad/s],loud [rad/s]"
+    np.savetxt(tmp_path / "bench.csv", columns.T, header=head, comments="", delimiter=",")
+    channels = {name: {"column": name, "time": {"rate": 500.0}} for name in ("laser", "quiet", "loud")}
+    log = testbed.read_log(tmp_path / "bench.csv", {"channels": channels})
+    quiet, loud = testbed.identify_sensors(log, "laser", ["quiet", "loud"])
+    said = "its own noise is too small beside that of the reference"
+    assert any(note.startswith(said) for note in quiet.notes)
+    assert not any(note.startswith(said) for note in loud.notes)
+    # Between the lines the reference's is none of theirs. Hundreds of degrees of freedom: some per cent.
+    for sensor, std in ((quiet, 1e-6), (loud, 1e-2)):
+        found = np.hypot(sensor.belief.input_noise, sensor.belief.output_noise)
+        assert found == pytest.approx(std / np.sqrt(500.0), rel=0.2, abs=0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -14,7 +15,9 @@ from testbed.errors import ScenarioError
 from testbed.judging.allan_records import read
 from testbed.logs import keeping, read_log
 from testbed.logs.formats import open_table
+from testbed.logs.logmap import ChannelMap, LogMap
 from testbed.logs.means import Means, Places
+from testbed.logs.reader import read_map
 from testbed.logs.selection import Selection
 from tests.logs.kinds import ANGLE, DEG, RATE, SECONDS, digits, lines
 from tests.shell import call
@@ -81,13 +84,21 @@ def test_what_memory_should_not_hold_is_refused_with_the_option(tmp_path, monkey
         read_log(path, average=0)
 
 
-def test_a_file_that_says_how_much_it_holds_is_refused_unread(tmp_path, monkeypatch):
-    path = tmp_path / "log.parquet"
-    pq.write_table(pa.table({"w [rad/s]": np.zeros(6000), "t [ns]": np.arange(6000) * 1_000_000}), path)
-    monkeypatch.setattr(keeping, "MOST_KEPT", 10_000)
-    monkeypatch.setattr("testbed.logs.table.Table.blocks", None)
+@pytest.mark.parametrize("kind", ["parquet", "parts", "text"])
+def test_a_file_that_says_how_much_it_holds_is_refused_unread(kind, tmp_path, monkeypatch):
+    """Of several files all count; of a text its size says it, to half of what the first lines promise."""
+    columns = {"w [rad/s]": np.zeros(3000), "t [ns]": np.arange(3000) * 1_000_000}
+    paths = [tmp_path / f"{i}.{'csv' if kind == 'text' else 'parquet'}" for i in range(2 if kind == "parts" else 1)]
+    for path in paths:
+        if kind == "text":
+            rows = (f"{w},{t}" for w, t in zip(*columns.values(), strict=True))
+            path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+        else:
+            pq.write_table(pa.table(columns), path)
+    monkeypatch.setattr(keeping, "MOST_KEPT", {"parquet": 5999, "parts": 11_999, "text": 2900}[kind])
+    monkeypatch.setattr(keeping, "_Columns", lambda *_: SimpleNamespace(add=lambda *_: pytest.fail("it was read")))
     with pytest.raises(ScenarioError, match="--average 1000 keeps means"):
-        read_log(path)
+        read_map(None, LogMap(file=paths, channels={"w": ChannelMap(column="w")}))
 
 
 def test_uneven_stamps_are_refused_with_means_too(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,9 +127,7 @@ def test_a_reference_with_a_gap_is_judged_where_it_is_known(bench, tmp_path):
     ("said", "message"),
     [
         ({"settle": 5.0}, "--settle: expected less than the 1 s of the recording"),
-        ({"lines": [-1.0]}, "--lines: expected frequencies between 0 and 10000 Hz"),
-        ({"start": "moving"}, "--start: expected unknown or rest"),
-        ({"outputs": ["reprot"], "out": "x"}, "unknown output 'reprot'"),
+        ({"lines": [12e3]}, "--lines: expected frequencies below 10000 Hz"),
     ],
 )
 def test_what_makes_no_sense_is_refused(said, message, bench):
@@ -136,9 +135,46 @@ def test_what_makes_no_sense_is_refused(said, message, bench):
         testbed.replay(bench[1], ["kalman"], **said)
 
 
-def test_lines_need_a_reference(bench):
-    with pytest.raises(ScenarioError, match="gain and phase need a reference"):
-        testbed.replay([], ["kalman"], map=without_reference(bench[1]), lines=LINES)
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"filters": ["calman"]}, "unknown filter 'calman'"),
+        ({"belief": "eq93"}, "eq93"),
+        ({"settle": -1.0}, "--settle: expected a time from 0 s on"),
+        ({"lines": [-1.0, 10.0]}, r"--lines: expected frequencies above 0 Hz, got -1 Hz(.|\n)*need a reference"),
+        ({"start": "moving"}, "--start: expected unknown or rest"),
+        ({"outputs": ["reprot"], "out": "x"}, "unknown output 'reprot'"),
+        ({"out": "taken"}, "taken: exists and is no folder of the testbed"),
+    ],
+)
+def test_what_is_wrong_is_told_before_the_recording_is_read(said, message, bench, tmp_path, monkeypatch):
+    """A record of hours takes minutes to read."""
+
+    def read(_plans):
+        pytest.fail("the recording was read")
+
+    monkeypatch.setattr("testbed.playback.source.read_plans", read)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("mine")
+    with pytest.raises(ScenarioError, match=message):
+        testbed.replay([], map=without_reference(bench[1]), **{"filters": ["kalman"], **said})
+
+
+def test_outputs_without_a_folder_are_refused(bench):
+    with pytest.raises(ValueError, match="outputs: expected only beside out"):
+        testbed.replay(bench[1], ["kalman"], outputs=["metrics"])
+
+
+def test_a_replay_that_its_disk_cannot_hold_is_refused_at_its_first_block(bench, tmp_path, monkeypatch):
+    place = tmp_path / "run"
+    testbed.replay(bench[1], ["kalman"], out=place)
+    took = sum(path.stat().st_size for path in place.iterdir())
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=took // 2))
+    with pytest.raises(ScenarioError, match=r"the run takes about .* GB, but its disk has room for"):
+        testbed.replay(bench[1], ["kalman"], out=place)
+    # Room for it by what it took, and half as much again.
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=round(1.5 * took)))
+    testbed.replay(bench[1], ["kalman"], out=place)
 
 
 def test_what_a_filter_refuses_is_told_by_its_name(bench):

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import testbed
 from testbed.pointing.actuator import butterworth_mirror
 from testbed.pointing.parameters import Link, Mirror, PointingParameters, Window, window_key
-from testbed.scenario.model import dump
+from testbed.scenario.resolved import dump
 
 FULL = {
     "tracker": {"bandwidth": "10 Hz", "noise": "5 nrad/sqrt(Hz)", "fades": [{"at": "0.2 s", "length": "0.1 s"}]},

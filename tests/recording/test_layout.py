@@ -65,7 +65,7 @@ def test_the_views_of_every_shipped_scenario_have_the_unit_of_its_report(path):
     unit = scenario.rate_unit
     assert unit == ("deg/h" if path.parent.name == "fog" and path.stem != "fused" else "deg/s")
     shown = blueprint(
-        entities=entities_of(scenario),
+        entities=dict.fromkeys(entities_of(scenario)),
         sensors=list(scenario.sensors),
         filters=list(scenario.fusion),
         channels=["mhd_ars"],
@@ -98,6 +98,52 @@ def titles(part):
     for inner in getattr(part, "contents", []):
         if not isinstance(inner, str):
             yield from titles(inner)
+
+
+def plots(**extremes):
+    """Return the plots of a run by their title; extremes of its signals after settle by name and diagnostic."""
+    entities = {f"/fusion/{name.replace('__', '/')}": found for name, found in extremes.items()}
+    shown = blueprint(
+        entities=entities,
+        sensors=["mhd_ars"],
+        filters=sorted({entity.split("/")[2] for entity in entities}),
+        channels=[],
+        model=None,
+        clock=Clock(20e3, 400_000, (10.0, 12.0)),
+        unit="deg/s",
+    )
+    return {view.name: view for view in views(shown.root_container)}
+
+
+def views(part):
+    """Yield every view below a part of the layout."""
+    if isinstance(part, rrb.View):
+        yield part
+    for inner in getattr(part, "contents", []):
+        if not isinstance(inner, str):
+            yield from views(inner)
+
+
+def scale(view):
+    """Return the ends of the upright axis, None where the viewer finds them."""
+    axis = view.properties.get("ScalarAxis")
+    return None if axis is None else tuple(axis.range.as_arrow_array().to_pylist()[0])
+
+
+def test_errors_stand_beside_each_other_in_one_scale_but_for_one_that_would_be_flat():
+    found = plots(a__error=(-2.0, 1.0), b__error=(-0.6, 0.9), c__error=(-0.1, 0.1))
+    assert {f"Error of {name} [deg/s]" for name in "abc"} <= set(found)
+    # 5 % of the span of 4 at each end.
+    assert scale(found["Error of a [deg/s]"]) == scale(found["Error of b [deg/s]"]) == pytest.approx((-2.2, 2.2))
+    assert scale(found["Error of c [deg/s]"]) is None
+    assert found["Error of a [deg/s]"].contents == ["/fusion/a/error"]
+
+
+def test_the_start_sets_no_scale_but_that_of_counts_and_logarithms():
+    found = plots(w__frequency_mhd_ars=(9.0, 11.0), w__log10_R_mhd_ars=(-6.0, -5.0), w__gated_mhd_ars=(3.0, 7.0))
+    assert scale(found["Frequency that is seen, mhd_ars [Hz]"]) == pytest.approx((8.9, 11.1))
+    assert scale(found["Adapted R, mhd_ars [log10 of (deg/s)²]"]) is None
+    assert scale(found["Gated readings, mhd_ars [counted]"]) is None
 
 
 def test_the_names_of_all_diagnostics_stand_in_one_row_of_tabs():

@@ -60,6 +60,35 @@ def test_the_viewer_sees_each_block_and_the_file_is_that_of_a_run_unwatched(clie
         assert np.array_equal(rows(tmp_path / "live.rrd", entity), rows(tmp_path / "alone.rrd", entity))
 
 
+def needle(path):
+    """Return the angle of the needle at each instant as the viewer has it: of two, the one that came last."""
+    found = {}
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == "/world/dial/needle" and not chunk.is_static:
+            batch = chunk.to_record_batch()
+            ids = batch.column(0).to_pylist()
+            turns = np.array(batch.column("Transform3D:quaternion").flatten().flatten().to_numpy()).reshape(-1, 4)
+            for time, row, turn in zip(batch.column("sim_time").to_pylist(), ids, turns, strict=True):
+                found[time] = max(found.get(time, (b"", 0.0)), (row, 2 * np.arctan2(turn[2], turn[3])))
+    return np.array([found[time][1] for time in sorted(found)])
+
+
+@pytest.mark.slow
+def test_needle_and_channel_are_seen_while_it_runs_and_end_in_the_same_scale(client, synthetic_run, tmp_path):
+    """The table turns ever further: the dial of the first second is another than that of the last."""
+    run = synthetic_run(60_000, filters=("kalman",))
+    run.angle = 1e-3 * np.arange(run.n_time) / run.n_time
+    scales = []
+    with run.writer(tmp_path / "live.rrd", live=str(client.url)) as writer:
+        for block in run.blocks(10_000):
+            writer.write(block)
+            scales.append((writer._world._scale, writer._channels["mhd_ars"]._full))
+    assert len({dial for dial, _ in scales}) > 2
+    assert all(full > 0.0 for _, full in scales)
+    run.record(tmp_path / "alone.rrd")
+    np.testing.assert_array_equal(needle(tmp_path / "live.rrd"), needle(tmp_path / "alone.rrd"))
+
+
 @pytest.mark.slow
 def test_a_window_that_is_closed_costs_nothing_of_the_file(synthetic_run, tmp_path, capfd):
     run = synthetic_run(60_000, filters=("kalman",))

@@ -141,7 +141,11 @@ def test_every_name_and_title_says_the_unit_of_the_run(run, tmp_path, unit):
         for chunk in stream:
             said |= set(words_of(chunk.to_record_batch()))
     named = {word for word in said if re.search(r"[a-z]/[sh]\b", word)}
-    assert {f"kalman [{unit}]", f"Rate, whole run [{unit}]", f"Adapted R, mhd_ars [log10 of ({unit})²]"} <= named
+    assert {
+        f"Error of kalman [{unit}]",
+        f"Rate, whole run [{unit}]",
+        f"Adapted R, mhd_ars [log10 of ({unit})²]",
+    } <= named
     assert all(unit in word for word in named)
 
 
@@ -357,11 +361,13 @@ def test_lost_readings_are_marked_and_readings_that_were_not_due_are_not(synthet
 def test_a_profile_below_the_resolution_draws_no_axes_of_its_own(tmp_path, recwarn):
     """At standstill the fluid's velocity is arithmetic, 1e-90 rad/s: its scale would overflow single precision."""
     from testbed.recording.channel import Channel
+    from testbed.recording.stream import Recording
 
     calls = []
-    recording = SimpleNamespace(static=lambda *args: calls.append(args), columns=lambda *_: None, stream=None)
+    recording = Recording(SimpleNamespace(log=lambda *args, **_: calls.append(args)), None)
     channel = Channel.__new__(Channel)
     channel._unit = "deg/s"
+    channel._full = 0.0
     channel._largest, channel._heights, channel._color = 1e-90, np.array([0.0, 1e-3]), "#2f86d6"
     channel._recording, channel.entity = recording, "/sensors/mhd_ars/channel"
     channel._batch = SimpleNamespace(flush=lambda: None)

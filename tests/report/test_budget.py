@@ -73,7 +73,7 @@ def test_the_terminal_says_it_in_one_line(
         r"crossover 0\.0116\d Hz; mhd_ars 0\.000\d+ deg/s \(most at 0\.01-0\.1 Hz\), mems_gyro 0\.00\d+ deg/s", line
     )
     entry = run[0]["fusion"]["complementary"]["lines"][0]
-    assert f" deg, {entry['error_deg_s'] / entry['optimum_deg_s']:.1f}" in text
+    assert f" deg, {entry['error_deg_s'] / entry['optimum_deg_s']:.3g}" in text
     quiet = RunMetrics.model_validate({**run[0], "budget": None})
     print_metrics(quiet, tmp_path)
     assert "noise floor:" not in capsys.readouterr().out

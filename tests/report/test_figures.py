@@ -220,14 +220,16 @@ def test_lines_of_a_group_differ_in_more_than_color(digest: Digest):
     ("limits", "shown"),
     [
         ((1.3e-5, 8e-5), ["2×10⁻⁵", "5×10⁻⁵"]),  # no power of ten inside: the axis had no number at all
-        ((3e-5, 6e-4), ["5×10⁻⁵", "10⁻⁴", "0.0002", "0.0005"]),
+        ((3e-5, 6e-4), ["5×10⁻⁵", "10⁻⁴", "2×10⁻⁴", "5×10⁻⁴"]),  # one way of writing along an axis
+        ((0.002, 0.06), ["0.002", "0.005", "0.01", "0.02", "0.05"]),
+        ((1e-5, 30.0), ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰", "10¹"]),
         ((1e-5, 1e-3), ["10⁻⁵", "10⁻⁴", "10⁻³"]),
     ],
 )
 def test_a_narrow_logarithmic_axis_is_labelled_between_the_powers_of_ten(limits, shown):
     from matplotlib.figure import Figure
 
-    from testbed.pages.axes import decade_axis
+    from testbed.pages.decades import decade_axis
 
     figure = Figure()
     axes = figure.subplots()

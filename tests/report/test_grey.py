@@ -61,8 +61,9 @@ def test_the_curves_of_a_campaign():
 
     points = [point(value) for value in (1.0, 3.0, 10.0, 30.0)]
     sources = [("sensor", "mhd_ars"), ("sensor", "mems_gyro"), *(("filter", name) for name in MANY["fusion"])]
-    drawn = figures_of(Summary(dict.fromkeys(sources, points), [], []), ["f"])
+    drawn = figures_of(Summary(dict.fromkeys(sources, points), [], []), {"f": "Hz"})
     assert {"errors", "response", "sight"} <= set(drawn)
+    assert {figure.axes[-1].get_xlabel() for figure in drawn.values()} == {"f [Hz]"}
     assert [(name, *pair) for name, figure in drawn.items() for pair in confused(figure)] == []
 
 

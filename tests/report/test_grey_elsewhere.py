@@ -1,4 +1,4 @@
-"""Printed in grey, the figures of `allan`, `psd`, `identify`, `audit`, `regress` and `reproduce` can be read too."""
+"""Printed in grey, the figures of allan, psd, identify, audit, design, regress and reproduce can be read too."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import pytest
 from testbed.allan import allan_deviation, fit_allan
 from testbed.campaigns.regression import page as regression
 from testbed.compensation.record import GyroRecord
+from testbed.design.figure import pareto_figure
+from testbed.design.search import Candidate, Design
 from testbed.drift.figures import drift_figure, gain_figure, residual_allan_figure
 from testbed.identification.figure import response_figure
 from testbed.judging.allan_analysis import allan_figure, analyse
@@ -21,7 +23,7 @@ from testbed.reproduce.paper2 import figures as paper2
 from testbed.reproduce.paper3 import figures as paper3
 from testbed.reproduce.paper3.page import _STYLES, _gain_figure
 from testbed.sensors.noise import GyroNoise
-from tests.report.grey import confused
+from tests.report.grey import confused, style
 
 FILTERS = ("kalman", "shakf", "arw_shakf", "wideband", "imm", "mine")
 
@@ -82,6 +84,20 @@ def test_an_audit_and_the_page_of_paper_3(rate):
     styles = {str(k): style for k, style in enumerate(_STYLES)}
     assert confused(_gain_figure(dict.fromkeys(styles, audit), styles)) == []
     assert confused(residual_allan_figure(dict.fromkeys(styles, quality), styles)) == []
+
+
+def test_the_candidates_of_a_design():
+    made = [
+        Candidate(("fog",), "blend", "tracker", f"mirror_{k}", float(k), {"residual_rms_urad": 9.0 / k}, met=k > 2)
+        for k in range(1, 5)
+    ]
+    figure = pareto_figure(Design(tuple(made), {}), "residual_rms_urad", 4.0, "residual")
+    looks = {
+        text.get_text(): style(handle)
+        for text, handle in zip(figure.legends[0].get_texts(), figure.legends[0].legend_handles, strict=True)
+    }
+    assert looks["is enough"] != looks["is not"]
+    assert confused(figure) == []
 
 
 def test_the_history_of_a_campaign(monkeypatch):

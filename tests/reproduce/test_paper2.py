@@ -117,11 +117,14 @@ def test_the_claims_are_those_of_the_measured_arrays() -> None:
         np.array([0.1, 10.0, 900.0]),
         np.array([[1.0, 1.0, 9.0, 1.0], [1.0, 4.0, 2.0, 1.0], [1.0, 1.0, 9.0, 1.0]]),
     )
-    ripple, low, straight, noise = list(_claims(protocol, np.array([1.0, 1.02]), linear, freq, density))[2:]
+    given = protocol, np.array([1.0, 1.02]), linear, freq
+    ripple, low, straight, noise = list(_claims(*given, [density]))[2:]
     assert ripple.endswith(" 1.980 %")
     assert "0.04000 +- 0" in low
     assert straight.endswith("1.0e+00 (2.0e+00) %")
     assert noise.endswith(" 3.01 dB")
+    louder = density * [1.0, 1.0, 2.0, 1.0]
+    assert list(_claims(*given, [louder, density, density]))[-1].endswith(" 3.01 dB (3.01 to 6.02)")
 
 
 @pytest.mark.slow

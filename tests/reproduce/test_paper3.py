@@ -8,9 +8,12 @@ import pytest
 from markupsafe import escape
 
 from testbed.allan import allan_deviation
-from testbed.compensation.paper3 import PaperOptions
+from testbed.compensation import rivals
+from testbed.compensation.paper3 import PaperOptions, compensate, decompose
 from testbed.compensation.training import block_means
 from testbed.reproduce import paper3
+from testbed.reproduce.paper3.decompositions import Decompositions
+from testbed.reproduce.paper3.table import COLUMNS, printed
 from testbed.units import DEG_H
 
 SHOWN = (
@@ -63,7 +66,8 @@ def test_the_honest_rows_never_see_the_record_that_they_are_judged_on(monkeypatc
     """Other programmes and other noise, one cycle or two; only the paper's rows train on the record itself."""
     seen = []
     monkeypatch.setattr(paper3, "train", lambda cycles, method: seen.append(cycles))
-    rows = list(paper3.cases(1, paper3.DriftProtocol(0.01)))
+    protocol = paper3.DriftProtocol(0.01)
+    rows = list(paper3.cases(1, protocol, Decompositions(protocol.options, 1)))
     judged = paper3.cycle("paper", 1, 0.01).record
     assert [len(cycles) for cycles in seen] == [2, 2, 1, 2]
     for record in (record for cycles in seen for record in cycles):
@@ -145,6 +149,59 @@ def test_the_figures_stand_beside_their_numbers(written):
     assert list(tables[11]["group"]) == sorted(tables[11]["group"])
     # The residual is in figure 11 and has no entropy.
     assert tables[12].size == tables[11].size - 1
+
+
+@pytest.mark.slow
+def test_the_table_of_seeds_is_the_table_where_there_is_one(written):
+    out, lines, rows = written
+    with (out / "table_2_seeds.csv").open(newline="") as file:
+        seeds = {(row["method"], row["trained_on"]): row for row in csv.DictReader(file)}
+    assert {key for key, row in rows.items() if row["leaks"]} == seeds.keys()
+    for key, row in seeds.items():
+        assert row["seed"] == "1"
+        assert {name: row[name] for name in COLUMNS} == {name: rows[key][name] for name in COLUMNS}
+    assert not any("least and largest" in line for line in lines)
+
+
+def audited(reduction, white):
+    """Return the summary of an audit that found these."""
+    after = {"coefficients": white and {"N": {"value": white}}}
+    after |= dict.fromkeys(("block_std_100s_deg_h", "allan_deviation_1h_deg_h"), 0.01)
+    return {
+        "after": after,
+        **dict.fromkeys(COLUMNS[5:], 0.5),
+        "drift_reduction": reduction,
+        "leaks": [],
+        "passed": True,
+    }
+
+
+def test_the_lines_say_between_what_the_seeds_are():
+    """The median of a distribution lies between least and largest of n draws but for 2 / 2^n."""
+    found = {("gradient", "1 other cycle"): [audited(r, w) for r, w in ((5.0, 7e-4), (9.0, 8e-4), (4.0, None))]}
+    median, between = (line for line in printed(found, 3) if line.startswith("gradient"))
+    assert re.findall(r"\S+", median)[-9:] == ["-", "0.00075", "5", "0.5", "0.5", "0.5", "0.5", "0/3", "0/3"]
+    assert "0.0007 to 0.0008" in between
+    assert "4 to 9" in between
+    assert any("of the 3 seeds" in line and line.endswith("75%") for line in printed(found, 3))
+
+
+def test_a_record_is_decomposed_once_for_all_rows(monkeypatch):
+    """With the result that each has by itself."""
+    record = paper3.cycle("paper", 2, 0.02).record
+    options = PaperOptions(trials=5, wolves=4, iterations=2)
+    decomposed = Decompositions(options, 2)
+    modes = decomposed.of(record)
+    assert np.array_equal(modes, decompose(record, options, 2))
+    assert decomposed.saved == 0.0
+    monkeypatch.setattr("testbed.reproduce.paper3.decompositions.decompose", None)
+    assert np.array_equal(
+        rivals.ceemdan_lwt(record, modes=decomposed.of(record)), rivals.ceemdan_lwt(record, seed=2, trials=5)
+    )
+    assert np.array_equal(
+        compensate(record, options, seed=2, modes=decomposed.of(record)).rate, compensate(record, options, seed=2).rate
+    )
+    assert decomposed.saved > 0.0
 
 
 def test_a_cycle_has_the_drift_of_the_paper_and_the_earth_on_top():

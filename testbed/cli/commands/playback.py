@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from testbed.cli.options import Output, PluginModules, RunDir, expanded
+from testbed.cli.options import Output, PluginModules, RunDir, WantedOutputs, expanded
 from testbed.cli.status import MISSED
 from testbed.errors import Problem, ScenarioError, quoted
 
@@ -75,29 +75,28 @@ def replay(
         str | None,
         typer.Option(metavar="FREQUENCIES", help="What the reference holds, such as '0.5, 10 Hz', for gain and phase."),
     ] = None,
-    outputs: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
-    ] = None,
+    outputs: WantedOutputs = None,
     out: Annotated[Path | None, typer.Option(help="Run folder to write; default runs/replay_<name>.")] = None,
     plugin: PluginModules = None,
 ) -> None:
     """Send a recording through filters, say first what stands against it, and write a run folder."""
     from testbed.cli.replays import print_replay, replay_words
     from testbed.logs.options import quantity
-    from testbed.playback.replay import play_back, prepare
+    from testbed.playback.replay import check_target, play_back, prepare
 
+    wanted = None if outputs is None else _list(outputs, "--outputs")
+    check_target(out, wanted)
     length = None if settle is None else 0.0 if settle.strip() == "0" else quantity(settle, "s", "2 s", "--settle")
     made = prepare(
         log or [],
-        [name for names in filter_ or () for name in _list(names)],
+        [name for names in filter_ or () for name in _list(names, "--filter")],
         fusion=fusion,
         map=map_,
         belief=belief,
         start=start,
         fix=fix,
         settle=length,
-        lines=[quantity(one, "Hz", "10 Hz", "--lines") for one in _list(lines)],
+        lines=[quantity(one, "Hz", "10 Hz", "--lines") for one in _list(lines, "--lines")],
         plugins=plugin or (),
     )
     for words in replay_words(made.name, made.lineup.duration, made.facts):
@@ -106,7 +105,7 @@ def replay(
     output.warn(str(finding) for finding in made.verdict.unfixed)
     target = out or Path("runs") / f"replay_{made.name}"
     with output.progress(made.name, made.lineup.duration) as tick:
-        run = play_back(made, target, outputs=None if outputs is None else _list(outputs), progress=tick)
+        run = play_back(made, target, outputs=wanted, progress=tick)
     document = {**run.metrics.to_dict(), "written": str(target)}
     output.show(document, lambda: print_replay(run.metrics, made.verdict, target))
     if made.verdict.unfixed:
@@ -132,9 +131,9 @@ def export(
     output.show(document, lambda: typer.echo(f"wrote {folder}: {', '.join(files)}"))
 
 
-def _list(text: str | None) -> list[str]:
+def _list(text: str | None, option: str) -> list[str]:
     """Return the parts of a list with commas."""
     parts = [part.strip() for part in (text or "").split(",")]
     if len(parts) > 1 and not all(parts):
-        raise ScenarioError([Problem(f"expected names with commas between them, got {quoted(text)}", "--filter")])
+        raise ScenarioError([Problem(f"expected one or more with commas between them, got {quoted(text)}", option)])
     return [part for part in parts if part]

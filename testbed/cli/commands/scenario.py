@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, expanded
+from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, WantedOutputs, expanded
 from testbed.cli.status import MISSED
 from testbed.errors import Problem, RunError, ScenarioError
 
@@ -23,10 +23,7 @@ def run(
     block: Annotated[
         str | None, typer.Option(metavar="TIME", help="Length of a block; the result does not depend on it.")
     ] = None,
-    outputs: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="What to write, of metrics,netcdf,recording,report; default all."),
-    ] = None,
+    outputs: WantedOutputs = None,
     view: Annotated[bool, typer.Option("--view", help="Open the recording afterwards.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Open the viewer now and watch the run in it.")] = False,
     plugin: PluginModules = None,

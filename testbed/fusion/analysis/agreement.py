@@ -141,6 +141,8 @@ class Pair:
         scale = np.diag([1.0, 1.0 / gain, 1.0 / gain])
         covariance = scale @ found.covariance @ scale
         common = found.share < _MOST_NOISE and abs(gain) > _STANDS_OUT * math.sqrt(covariance[0, 0])
+        # Steps that lead far beyond all that was searched follow no motion.
+        common = common and abs(offset) < 2.0 * _LONGEST and abs(rate) < 2.0 * _FASTEST
         return Agreement(
             gain, offset, rate, middle, covariance, common, found.swing, ambiguity, found.departure, found.departs_at
         )

@@ -61,7 +61,7 @@ class Compared:
     def factors(self) -> dict[str, float]:
         """By what each sensor's readings are too large, because of their unit [-]."""
         gain = abs(self.found.gain) if self.found.common else None
-        noisy, clean = unit_factors(gain, self.noise, self.clean_noise)
+        noisy, clean = unit_factors(gain, self.noise, self.clean_noise, (self.pair.noisy.said, self.pair.clean.said))
         return {self.names.noisy: noisy, self.names.clean: clean}
 
     @property
@@ -70,7 +70,8 @@ class Compared:
         names, found = self.names, self.found
         factors = self.factors
         shape = list(shape_findings(self.pair, found, self.noise, names))
-        said = [*unit_findings(factors, found, self.noise, names), *shape]
+        units = {names.noisy: self.pair.noisy.said, names.clean: self.pair.clean.said}
+        said = [*unit_findings(factors, found, units), *shape]
         # What the response is believed to be decides over gain and offset.
         sure = all(one.kind != "bandwidth" for one in shape)
         if found.common:
@@ -106,7 +107,7 @@ def compared(noisy: tuple[str, Trace], clean: tuple[str, Trace], clean_noise: No
         scaled=clean[1].belief.sees_constant or not noisy[1].belief.sees_constant,
     )
     both = f"{noisy[0]} and {clean[0]}: sign, gain, offset and rate:"
-    one, other = (_without_repeats(trace) for trace in (noisy[1], clean[1]))
+    one, other = (without_repeats(trace) for trace in (noisy[1], clean[1]))
     common = min(one.t[-1], other.t[-1]) - max(one.t[0], other.t[0])
     if common < max(_LEAST_SECONDS, _LEAST_READINGS * max(one.interval, other.interval)):
         return f"{both} they have {max(common, 0.0):.3g} s in common"
@@ -122,6 +123,8 @@ def compared(noisy: tuple[str, Trace], clean: tuple[str, Trace], clean_noise: No
     return Compared(names, pair, found, path, noise_beside(pair, path), clean_noise)
 
 
-def _without_repeats(trace: Trace) -> Trace:
-    """Return a trace with what filters take off it: its believed bias, and readings that are stuck."""
+def without_repeats(trace: Trace) -> Trace:
+    """Return a trace with what filters take off it: its believed bias, and readings that are stuck or at the end of the
+    range, which repeat themselves.
+    """
     return replace(trace, z=np.where(repeated(trace), math.nan, trace.z - trace.belief.bias))

@@ -34,15 +34,17 @@ def continuity_findings(name: str, trace: Trace, factor: float = 1.0) -> Iterato
         What they are too large by, if their unit is not the one that was said [-].
     """
     yield from _gaps(name, trace)
-    stuck, count = repeated(trace), trace.z.size
+    limit = math.inf if trace.belief.range is None else trace.belief.range - 1.5 * (trace.belief.resolution or 0.0)
+    at_end, count = np.abs(trace.z) >= factor * limit, trace.z.size
+    # What stands at the end of the range repeats itself there.
+    stuck = repeated(trace) & ~at_end
     if stuck.any():
         remedy = (
             f"{np.count_nonzero(stuck)} readings repeat each other, more than {_most(trace)} in a row, as none of the "
             "believed noise and resolution do: mend what stuck, or take them for missing"
         )
         yield Finding("repeats", name, np.count_nonzero(stuck) / count, math.nan, math.nan, "1", remedy)
-    limit = math.inf if trace.belief.range is None else trace.belief.range - 1.5 * (trace.belief.resolution or 0.0)
-    ends = np.count_nonzero(np.abs(trace.z) >= factor * limit)
+    ends = np.count_nonzero(at_end)
     if ends:
         remedy = (
             f"{ends} readings are at the end of the range or beyond, and filters take them for missing: take a wider "

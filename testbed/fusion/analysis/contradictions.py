@@ -26,7 +26,6 @@ _MEMORY = 5e-3
 _DEPARTURE, _SLOPE = 0.05, 3.0
 # How close a gain, or a noise, is to a factor between units, to be one, and what an odd unit must explain: logarithms.
 _CLOSE, _ODD = 0.08, 0.7
-_FACTORS = (1.0, *UNITS.values(), *(1.0 / one for one in UNITS.values()))
 # A mean is no bias below this [rad/s], and shows only through dynamics that pass a constant with at least this gain.
 _LEAST_BIAS, _LEAST_SEEN = math.radians(0.01), 0.1
 
@@ -61,7 +60,18 @@ class Names:
         return (self.noisy, self.clean) if self.scaled else (self.clean, self.noisy)
 
 
-def unit_factors(gain: float | None, noisy: NoiseRatio | None, clean: NoiseRatio | None) -> tuple[float, float]:
+def _factors(said: float) -> list[float]:
+    """Return by what readings may be too large if they are in another unit than was said, `said` as of `Trace`: of
+    rad/s nothing tells from what they were taken.
+    """
+    if said == 1.0:
+        return [1.0, *UNITS.values(), *(1.0 / one for one in UNITS.values())]
+    return [1.0, *(one / said for one in (1.0, *UNITS.values()) if not math.isclose(one, said, rel_tol=1e-6))]
+
+
+def unit_factors(
+    gain: float | None, noisy: NoiseRatio | None, clean: NoiseRatio | None, said: tuple[float, float] = (1.0, 1.0)
+) -> tuple[float, float]:
     """Return by what the readings of two sensors are too large because of their units [-]: what explains their gain and
     their noise by the fewest odd units.
 
@@ -71,9 +81,11 @@ def unit_factors(gain: float | None, noisy: NoiseRatio | None, clean: NoiseRatio
         Of the noisy sensor over the clean one [-], None if no motion shows in both.
     noisy, clean : NoiseRatio or None
         Noise of each over the believed one.
+    said : tuple of float, optional
+        The unit that was said of each, as of `Trace`.
     """
     loud = [0.0 if one is None else math.log(max(float(one.value[one.least]), 1e-300)) for one in (noisy, clean)]
-    pairs = [(math.log(one), math.log(other)) for one in _FACTORS for other in _FACTORS]
+    pairs = [(math.log(one), math.log(other)) for one in _factors(said[0]) for other in _factors(said[1])]
     if gain is not None:
         pairs = [pair for pair in pairs if abs(math.log(gain) - pair[0] + pair[1]) < _CLOSE] or [(0.0, 0.0)]
     else:
@@ -88,9 +100,7 @@ def unit_factors(gain: float | None, noisy: NoiseRatio | None, clean: NoiseRatio
     return math.exp(best[0]), math.exp(best[1])
 
 
-def unit_findings(
-    factors: Mapping[str, float], found: Agreement, noise: NoiseRatio | None, names: Names
-) -> Iterator[Finding]:
+def unit_findings(factors: Mapping[str, float], found: Agreement, said: Mapping[str, float]) -> Iterator[Finding]:
     """Yield readings in another unit than was said.
 
     Parameters
@@ -99,22 +109,27 @@ def unit_findings(
         By what each sensor's are too large [-].
     found : Agreement
         Of the two.
-    noise : NoiseRatio or None
-        Of the noisy sensor.
-    names : Names
-        Of the two.
+    said : mapping of str to float
+        The unit that was said of each, as of `Trace`.
     """
     for name, factor in factors.items():
         if factor == 1.0:
             continue
-        unit = next((text for text, value in UNITS.items() if math.isclose(factor, value)), "")
-        said = f"it reads in {unit}, not in rad/s" if unit else "it reads in rad/s, not in what was said"
+        wanted = _unit_name(said[name], "what was said")
+        unit = _unit_name(factor * said[name], "")
+        words = f"it reads in {unit}, not in {wanted}" if unit else "it reads in rad/s, not in what was said"
         half = math.exp(_CLOSE)
         if found.common and sum(one != 1.0 for one in factors.values()) == 1:
             half = 1.0 + _half(found)
         yield Finding(
-            "unit", name, factor, factor / half, factor * half, "1", f"{said}: divide its readings by {factor:.6g}"
+            "unit", name, factor, factor / half, factor * half, "1", f"{words}: divide its readings by {factor:.6g}"
         )
+
+
+def _unit_name(value: float, other: str) -> str:
+    """Return the unit of which so many are 1 rad/s, `other` if it is none."""
+    units = {"rad/s": 1.0, **UNITS}
+    return next((text for text, one in units.items() if math.isclose(value, one, rel_tol=1e-6)), other)
 
 
 def sign_findings(found: Agreement, names: Names, unit: float) -> Iterator[Finding]:
@@ -212,6 +227,12 @@ def shape_findings(pair: Pair, found: Agreement, noise: NoiseRatio | None, names
         ends, wanted = (_end(noise.freq_hz, one) for one in (noise.value * believed, believed))
         step = math.sqrt(noise.freq_hz[1] / noise.freq_hz[0])
         said = f"its noise ends at {ends:.3g} Hz, and is believed to end at {wanted:.3g} Hz:"
+        if ends == wanted:
+            most, least = int(np.argmax(noise.value)), noise.least
+            said = (
+                f"its noise is {noise.value[most]:.3g} times the believed one at {noise.freq_hz[most]:.3g} Hz, and "
+                f"{noise.value[least]:.3g} times at {noise.freq_hz[least]:.3g} Hz:"
+            )
         if found.common and not _responds_otherwise(found):
             high, (lower, upper) = int(np.argmax(noise.value)), noise.interval(int(np.argmax(noise.value)))
             remedy = f"{said} its response is as believed, so raise output_noise of the belief"

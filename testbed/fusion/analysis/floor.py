@@ -15,12 +15,16 @@ from testbed.fusion.analysis.finding import QUANTILE, Finding
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from testbed.fusion.analysis.agreement import Pair
     from testbed.fusion.analysis.paths import Trace
     from testbed.signals import FloatArray
 
 # Segments of a record, and the longest [s]; lines of the spectrum below the first band; bands of an octave.
 _SEGMENTS, _LONGEST, _FIRST, _PER_OCTAVE = 16, 1.0, 3.0, 2.0
+# Readings that are missing for longer than this are not filled in [s].
+_SHORT_GAP = 0.01
 _HIGHEST_SHARE, _LEAST_SEGMENT, _LEAST_SEGMENTS = 0.45, 16, 12
 # Ratio beyond which the belief is wrong [-]: a cautious one is not, and what has no noise at all is no instrument.
 _LOUD, _QUIET, _SILENT = 1.5, 0.25, 1e-3
@@ -69,8 +73,22 @@ def own_noise(trace: Trace) -> NoiseRatio | None:
     n = _segment(z.size, fs)
     if n < _LEAST_SEGMENT:
         return None
-    freq, density = welch(z, fs=fs, nperseg=n, detrend=detrend, average="median")
+    overlap, bridged = n // 2, _long_gaps(good, max(_SHORT_GAP * fs, 3.0))
+    if bridged.any():
+        # A straight line over a gap, or over what was cut off at the end of the range, is no noise.
+        whole = [z[k : k + n] for k in range(0, z.size - n + 1, n) if not bridged[k : k + n].any()]
+        if len(whole) < _LEAST_SEGMENTS:
+            return None
+        overlap, z = 0, np.concatenate(whole)
+    freq, density = welch(z, fs=fs, nperseg=n, noverlap=overlap, detrend=detrend, average="median")
     return _banded(freq, 0.5 * density, trace.reading_noise(np.maximum(freq, freq[1])), z.size / n)
+
+
+def _long_gaps(good: NDArray[np.bool_], most: float) -> NDArray[np.bool_]:
+    """Return what belongs to runs of more than so many readings that are not good, shape (n_time,)."""
+    begins = np.flatnonzero(np.concatenate([[True], good[1:] != good[:-1]]))
+    lengths = np.diff(begins, append=good.size)
+    return ~good & np.repeat(lengths > most, lengths)
 
 
 def noise_beside(pair: Pair, a: FloatArray) -> NoiseRatio | None:

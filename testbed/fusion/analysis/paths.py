@@ -43,11 +43,14 @@ class Trace:
         Readings [rad/s], NaN where there is none.
     belief : SensorBelief
         Dynamics and noise.
+    said : float, optional
+        How many of the unit that was said of the readings are 1 rad/s [-].
     """
 
     t: FloatArray
     z: FloatArray
     belief: SensorBelief
+    said: float = 1.0
 
     @cached_property
     def interval(self) -> float:

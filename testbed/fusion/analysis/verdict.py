@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from testbed.errors import quoted
-from testbed.fusion.analysis.comparison import Compared, compared
+from testbed.fusion.analysis.comparison import Compared, compared, without_repeats
 from testbed.fusion.analysis.continuity import continuity_findings
 from testbed.fusion.analysis.finding import Finding, Verdict
 from testbed.fusion.analysis.floor import loudness_findings, own_noise
@@ -26,10 +27,15 @@ if TYPE_CHECKING:
 _LEAST_READINGS = 100
 # Where the sensors' noise is compared to find the cleanest [Hz].
 _BAND_HZ = np.geomspace(1.0, 30.0, 16)
+# Kinds of findings that another sensor would explain.
+_OF_BELIEF = ("belief", "bandwidth")
 
 
 def verdict(
-    readings: Mapping[str, ArrayLike], time_ns: Mapping[str, NDArray[np.int64]], belief: Mapping[str, SensorBelief]
+    readings: Mapping[str, ArrayLike],
+    time_ns: Mapping[str, NDArray[np.int64]],
+    belief: Mapping[str, SensorBelief],
+    said: Mapping[str, float] = MappingProxyType({}),
 ) -> Verdict:
     """Return what the readings contradict: each other, and what is believed of the sensors.
 
@@ -44,6 +50,9 @@ def verdict(
         Their stamps on whatever clocks [ns].
     belief : mapping of str to SensorBelief
         Dynamics and noise of each sensor.
+    said : mapping of str to float, optional
+        How many of the unit that was said of its readings, before they were turned into rad/s, are 1 rad/s, for what
+        another unit would make of them [-]; 1 for the others.
 
     Returns
     -------
@@ -70,14 +79,34 @@ def verdict(
     [('sign', 'turned')]
     """
     check_belief(belief, readings)
-    traces = _traces(readings, time_ns, belief)
+    traces = {name: replace(one, said=said.get(name, 1.0)) for name, one in _traces(readings, time_ns, belief).items()}
     few = [name for name, trace in traces.items() if np.count_nonzero(np.isfinite(trace.z)) < _LEAST_READINGS]
     undecided = [f"{name}: anything: it has fewer than {_LEAST_READINGS} readings" for name in few]
     kept = {name: trace for name, trace in traces.items() if name not in few}
     if not kept:
         return Verdict((), tuple(undecided))
+    found = _judged(kept)
+    if len(kept) == 2 and any(one.kind in _OF_BELIEF for one in found.findings):
+        found = _exchanged(kept, found)
+    return Verdict(found.findings, (*undecided, *found.undecided))
+
+
+def _exchanged(traces: Mapping[str, Trace], found: Verdict) -> Verdict:
+    """Return what stands against two sensors, or, if nothing would with each other's beliefs, that they are swapped."""
+    (one, first), (other, second) = traces.items()
+    swapped = _judged({one: replace(first, belief=second.belief), other: replace(second, belief=first.belief)})
+    if swapped.findings:
+        return found
+    worst = next(finding for finding in found.findings if finding.kind in _OF_BELIEF)
+    remedy = f"the readings of {one} are as is believed of {other}, and the other way round: exchange the two names"
+    return Verdict((replace(worst, remedy=remedy),), swapped.undecided)
+
+
+def _judged(kept: Mapping[str, Trace]) -> Verdict:
+    """Return what stands against sensors that have enough readings."""
+    undecided: list[str] = []
     clean = min(kept, key=lambda name: _input_noise(kept[name]))
-    noise = own_noise(kept[clean])
+    noise = own_noise(without_repeats(kept[clean]))
     results = [compared((name, trace), (clean, kept[clean]), noise) for name, trace in kept.items() if name != clean]
     undecided += [reason for reason in results if isinstance(reason, str)]
     pairs = [pair for pair in results if isinstance(pair, Compared)]

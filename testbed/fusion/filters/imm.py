@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,7 +11,6 @@ from pydantic import Field
 from testbed.fusion.base import BlockFilter, Rows
 from testbed.fusion.filters.kalman import KalmanParameters
 from testbed.fusion.kernels.literature import imm_kernel
-from testbed.fusion.model import build_model
 from testbed.fusion.model_filter import FilterParameters, initial_state
 from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, Quantity
@@ -80,17 +78,8 @@ class Imm(BlockFilter):
         self, belief: Mapping[str, SensorBelief], sample_rate_hz: Mapping[str, float], parameters: ImmParameters
     ) -> None:
         super().__init__(belief, sample_rate_hz, parameters)
-        built = partial(
-            build_model,
-            belief,
-            sample_rate_hz,
-            order=parameters.order,
-            use_input_noise=parameters.use_input_noise,
-            coloured=parameters.coloured,
-            start=parameters.start,
-            any_ratio=True,
-        )
-        self.model, self._calmest, self._ratios = built(q=parameters.q), built(q=0.0), parameters.ratios
+        self.model, self._calmest = (parameters.build(belief, sample_rate_hz, q) for q in (parameters.q, 0.0))
+        self._ratios = parameters.ratios
         self._Q = self._mixed(self.model.Q, self._calmest.Q)
         self._even = even(self.model.F, self._Q)
         self._nodes: tuple[FloatArray, FloatArray] | None = None

@@ -14,7 +14,7 @@ from testbed.fusion.analysis.indicator import FrequencyRows
 from testbed.fusion.base import Rows, Switch
 from testbed.fusion.kernels.bank import bank_kernel
 from testbed.fusion.kernels.covariance import JOSEPH, NODES
-from testbed.fusion.model import TIME_UNIT, build_model
+from testbed.fusion.model import TIME_UNIT
 from testbed.fusion.model_filter import FormParameters, ModelFilter
 from testbed.fusion.transitions import EVEN, Steps, even, transition_nodes
 from testbed.units import DEG, PositiveDuration
@@ -125,18 +125,7 @@ class Wideband(ModelFilter):
         q: FloatArray,
     ) -> FloatArray:
         """Return Q of each filter as the recursion carries it, shape (n_state, n_state, n_filter)."""
-        models = [
-            build_model(
-                belief,
-                sample_rate_hz,
-                order=parameters.order,
-                q=float(one),
-                use_input_noise=parameters.use_input_noise,
-                coloured=parameters.coloured,
-                any_ratio=True,
-            )
-            for one in q
-        ]
+        models = [parameters.build(belief, sample_rate_hz, float(one)) for one in q]
         return np.ascontiguousarray(np.stack([self.carried(model.Q) for model in models], axis=2))
 
     def _tables(self) -> tuple[FloatArray, ...]:

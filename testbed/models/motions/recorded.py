@@ -97,10 +97,17 @@ class Recorded(Motion):
         return str(file.relative_to(folder) if folder and file.is_relative_to(folder) else file)
 
     def kept_in(self, folder: Path, name: str) -> Self:
-        """Return the term that reads a copy of its file in `folder`, and nothing else than that."""
+        """Return the term that reads a copy of its file in `folder`, and nothing else than that; ScenarioError if
+        another file has the copy's name.
+        """
         content = self._content()
         copy = folder / f"{name}{self.file.suffix}"
-        copy.write_bytes(content)
+        if not copy.exists():
+            copy.write_bytes(content)
+        elif copy.stat().st_size != len(content) or copy.read_bytes() != content:
+            raise refusal(
+                copy, f"a copy of {self.file.name} would replace this file: move it away, or take another folder"
+            )
         return self.model_copy(update={"file": copy, "sha256": hashlib.sha256(content).hexdigest()})
 
     @model_validator(mode="after")

@@ -28,29 +28,43 @@
   const values = (_, marks) => marks.map((mark) => String(Number(mark.toPrecision(6))).replace("-", "−"));
   const axis = (label) => ({ label, values, stroke: css("--ink"), grid: { stroke: css("--rule"), width: 1 }, ticks: { stroke: css("--rule") } });
 
-  let plot = null;
-  const show = (view) => {
-    if (plot) plot.destroy();
-    const tables = view.traces.map((trace) => {
+  let plots = [];
+  // Charts of one view show the same time.
+  const follow = (leader, key) => {
+    if (key !== "x") return;
+    const { min, max } = leader.scales.x;
+    for (const other of plots) {
+      const shown = other.scales.x;
+      if (other !== leader && (shown.min !== min || shown.max !== max)) other.setScale("x", { min, max });
+    }
+  };
+  const chart = (view, traces, k, all) => {
+    const tables = traces.map((trace) => {
       const low = numbers(trace.low);
-      return [low.map((_, k) => trace.start + k * trace.step), low, numbers(trace.high)];
+      return [low.map((_, i) => trace.start + i * trace.step), low, numbers(trace.high)];
     });
-    plot = new uPlot(
+    return new uPlot(
       {
         width: holder.clientWidth,
-        height: 380,
+        height: all.length > 1 ? 210 : 380,
         scales: { x: { time: false } },
-        axes: [axis("time [s]"), { ...axis(view.label), size: 70 }],
-        cursor: { drag: { x: true, y: true, uni: 40 } },
-        series: [{ label: "time", value: (_, seconds) => (seconds === null ? "–" : `${seconds.toFixed(4)} s`) }, ...view.traces.flatMap(series)],
-        bands: view.traces.map((trace, k) => ({ series: [2 * k + 2, 2 * k + 1], fill: `${trace.color}66` })),
+        axes: [axis(k === all.length - 1 ? "time [s]" : null), { ...axis(view.label), size: 70 }],
+        cursor: { drag: { x: true, y: true, uni: 40 }, sync: { key: "closer" } },
+        series: [{ label: "time", value: (_, seconds) => (seconds === null ? "–" : `${seconds.toFixed(4)} s`) }, ...traces.flatMap(series)],
+        bands: traces.map((trace, i) => ({ series: [2 * i + 2, 2 * i + 1], fill: `${trace.color}66` })),
         hooks: {
-          setSeries: [(chart, index, what) => index > 0 && index % 2 === 0 && "show" in what && chart.setSeries(index - 1, { show: what.show })],
+          setScale: [follow],
+          setSeries: [(one, index, what) => index > 0 && index % 2 === 0 && "show" in what && one.setSeries(index - 1, { show: what.show })],
         },
       },
       uPlot.join(tables),
       holder,
     );
+  };
+  const show = (view) => {
+    plots.forEach((one) => one.destroy());
+    plots = [];
+    plots = view.charts.map((traces, k, all) => chart(view, traces, k, all));
     holder.dataset.view = view.title;
   };
 
@@ -67,6 +81,6 @@
   });
   section.hidden = false;
   show(views[0]);
-  new ResizeObserver(() => plot.setSize({ width: holder.clientWidth, height: 380 })).observe(holder);
+  new ResizeObserver(() => plots.forEach((one) => one.setSize({ width: holder.clientWidth, height: one.height }))).observe(holder);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => choice.querySelector("[aria-pressed=true]").click());
 })();

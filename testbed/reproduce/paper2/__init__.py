@@ -310,18 +310,19 @@ def report(seeds: int, out: Path, protocol: BenchProtocol | None = None, **param
     yield from rival_lines(rows)
     yield from write_pictures(lambda rate: bench_readings(rate, 1, switched_on(**parameters)), freq, density, out)
     yield ""
-    yield from _claims(protocol, scale[:, 2], linear, freq, density)
+    yield from _claims(protocol, scale[:, 2], linear, freq, [value for _, value in noise])
 
 
 def _claims(
-    protocol: BenchProtocol, scale: FloatArray, linear: FloatArray, freq: FloatArray, density: FloatArray
+    protocol: BenchProtocol, scale: FloatArray, linear: FloatArray, freq: FloatArray, densities: list[FloatArray]
 ) -> Iterator[str]:
     low = scale[np.array(protocol.scale_frequencies) < 1.0]
     half = 50.0 * np.ptp(low) / np.mean(low)
     judged = np.array(protocol.linear_frequencies) >= 2.0
     corner = cast("MhdArs", load_preset("mhd03")).channel.corner_freq_hz
     band = (freq >= corner) & (freq <= 500.0)
-    excess = 10.0 * np.log10(np.max(density[band, 2] / density[band, 3]))
+    excess = [10.0 * np.log10(np.max(one[band, 2] / one[band, 3])) for one in densities]
+    span = f" ({min(excess):.2f} to {max(excess):.2f})" if len(excess) > 1 else ""
     yield "fused output beside the paper"
     yield f"{'':34s}{'paper':>22s}{'target':>16s}{'ours':>26s}"
     rows = [
@@ -342,7 +343,7 @@ def _claims(
             f"noise over MHD ARS, {corner:.1f}-500 Hz",
             "equal level",
             "1 dB",
-            f"{excess:.2f} dB",
+            f"{np.median(excess):.2f} dB{span}",
         ),
     ]
     for row in rows:

@@ -22,11 +22,13 @@ from testbed.drift.page import Audited, write_audit
 from testbed.drift.quality import smoothed
 from testbed.drift.records import ThermalRecord
 from testbed.drift.summary import audit_summary
-from testbed.drift.table_2 import ORIGINAL, PIPELINE, TABLE_2
+from testbed.drift.table_2 import ORIGINAL, PIPELINE
 from testbed.models.temperature import TemperatureProfile
 from testbed.models.turntable.earth import SPEED
+from testbed.reproduce.paper3.decompositions import Decompositions
 from testbed.reproduce.paper3.figures import Decomposed, write_figures_10_to_14
 from testbed.reproduce.paper3.page import page
+from testbed.reproduce.paper3.table import medians_csv, printed, seeds_csv, shown_rows
 from testbed.runs.atomic import write_text
 from testbed.sensors import load_preset
 from testbed.sensors.stages import Surroundings
@@ -63,26 +65,6 @@ PROGRAMMES = {
 EQUATION_22 = "Kalman filter of equation (22)"
 WITH_SLOPE = "the same with slope"
 SLOPE = Features(degree=1, lags=())
-COLUMNS = (
-    "quantization_urad",
-    "bias_instability_deg_h",
-    "angle_random_walk_deg_sqrt_h",
-    "block_std_100s_deg_h",
-    "allan_deviation_1h_deg_h",
-    "drift_reduction",
-    "oracle_ratio_1h",
-    "block_std_over_oracle",
-    "bandwidth_hz",
-    "least_gain_in_drift_band",
-    "step_gain",
-    "seconds",
-)
-PAPER_COLUMNS = (
-    "paper_quantization",
-    "paper_bias_instability_deg_h",
-    "paper_angle_random_walk_deg_sqrt_h",
-    "paper_seconds",
-)
 
 
 @dataclass(frozen=True)
@@ -163,7 +145,7 @@ def through(
     return ThermalRecord(f"seed {seed}", GyroRecord(rate, stage.temperature, sample_rate_hz), stage.drift)
 
 
-def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
+def cases(seed: int, protocol: DriftProtocol, decomposed: Decompositions) -> Iterator[Contender]:
     """Yield the rows of the table for one seed, each trained when it is its turn.
 
     Parameters
@@ -172,6 +154,8 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
         Of the noise; the training cycles have seeds of their own.
     protocol : DriftProtocol
         Its numbers.
+    decomposed : Decompositions
+        Modes by the protocol's options and this seed.
     """
     fs = protocol.sample_rate_hz
     one = [cycle("up first", 1000 + seed, fs).record]
@@ -179,15 +163,14 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
     yield Contender(ORIGINAL, "-", lambda record: record.rate)
     yield Contender(EQUATION_22, "-", lambda record: fading_memory(record.rate, 0.583, choose_ratio(record.rate))[0])
     yield Contender("low-pass of 300 s", "-", lambda record: smoothed(record.rate, fs, 1.0 / 300.0))
-    trials = protocol.options.trials
     yield Contender("AKF [22]", "-", lambda record: rivals.akf22(record, seed=seed))
     yield Contender("OLMD-KPCA", "-", lambda record: rivals.olmd_kpca(record, seed=seed))
-    yield Contender("CEEMDAN-LWT", "-", lambda record: rivals.ceemdan_lwt(record, seed=seed, trials=trials))
+    yield Contender("CEEMDAN-LWT", "-", lambda record: rivals.ceemdan_lwt(record, modes=decomposed.of(record)))
     for name, options in (
         (PIPELINE, protocol.options),
         (WITH_SLOPE, replace(protocol.options, features=SLOPE)),
     ):
-        yield Contender(name, "this record", _paper(options, seed))
+        yield Contender(name, "this record", _paper(options, seed, decomposed))
     for name, method, cycles in (
         ("polynomial", "polynomial", two),
         ("LSSVM", "lssvm", two),
@@ -198,8 +181,8 @@ def cases(seed: int, protocol: DriftProtocol) -> Iterator[Contender]:
         yield Contender(name, f"{len(cycles)} other cycle{'s' if len(cycles) > 1 else ''}", _applied(model))
 
 
-def _paper(options: paper3.PaperOptions, seed: int) -> Compensate:
-    return lambda record: paper3.compensate(record, options, seed=seed).rate
+def _paper(options: paper3.PaperOptions, seed: int, decomposed: Decompositions) -> Compensate:
+    return lambda record: paper3.compensate(record, options, seed=seed, modes=decomposed.of(record)).rate
 
 
 def _applied(model: DriftModel) -> Compensate:
@@ -207,8 +190,8 @@ def _applied(model: DriftModel) -> Compensate:
 
 
 def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iterator[str]:
-    """Write table_2.csv, paper3.html, figures 10 to 14 and the audits of the first seed, and yield the table line by
-    line.
+    """Write table_2.csv, table_2_seeds.csv, paper3.html, figures 10 to 14 and the audits of the first seed, and yield
+    the table line by line.
 
     Parameters
     ----------
@@ -230,8 +213,9 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
     first: dict[str, Audited] = {}
     for seed in range(1, seeds + 1):
         thermal = cycle("paper", seed, protocol.sample_rate_hz)
-        for case in cases(seed, protocol):
-            audited, seconds = _audited(case, thermal)
+        decomposed = Decompositions(protocol.options, seed)
+        for case in cases(seed, protocol, decomposed):
+            audited, seconds = _audited(case, thermal, decomposed)
             found.setdefault((case.name, case.trained_on), []).append(
                 {**audit_summary(audited.audit), "seconds": seconds}
             )
@@ -243,14 +227,16 @@ def report(seeds: int, out: Path, protocol: DriftProtocol | None = None) -> Iter
                 folders[_title(case)] = f"audit_{case.name}_{case.trained_on}".translate(_PLAIN)
                 first[_title(case)] = audited
                 write_audit(audited, out / folders[_title(case)])
-    rows = [(*key, *_medians(runs)) for key, runs in found.items()]
-    write_text(out / "table_2.csv", _csv(rows, found))
+        if seed == 1:
+            modes = Decomposed.of(decomposed.of(thermal.record), protocol.sample_rate_hz, protocol.options)
+    write_text(out / "table_2.csv", medians_csv(found))
+    write_text(out / "table_2_seeds.csv", seeds_csv(found))
     audits = {name: audited.audit for name, audited in first.items()}
-    write_text(out / "paper3.html", page(_shown(rows, found), audits, list(folders.values()), seeds))
-    yield from _printed(rows, found, seeds)
+    write_text(out / "paper3.html", page(shown_rows(found), audits, list(folders.values()), seeds))
+    yield from printed(found, seeds)
     yield ""
     yield "figures of the first seed (SVG and PNG, the numbers in CSV)"
-    yield from write_figures_10_to_14(Decomposed.of(first[ORIGINAL].thermal, protocol.options, 1), first, out)
+    yield from write_figures_10_to_14(modes, first, out)
 
 
 def _title(case: Contender) -> str:
@@ -260,84 +246,10 @@ def _title(case: Contender) -> str:
 _PLAIN = str.maketrans({" ": "_", "'": None, "(": None, ")": None, ",": None, "-": None, "[": None, "]": None})
 
 
-def _audited(case: Contender, thermal: ThermalRecord) -> tuple[Audited, float]:
-    begin = time.perf_counter()
+def _audited(case: Contender, thermal: ThermalRecord, decomposed: Decompositions) -> tuple[Audited, float]:
+    """Return the audit, and how long the method took by itself [s]."""
+    begin, before = time.perf_counter(), decomposed.saved
     plain = case.compensate(thermal.record)
-    seconds = time.perf_counter() - begin
+    seconds = time.perf_counter() - begin + decomposed.saved - before
     found = find_leaks(case.compensate, thermal.record, plain, thermal.drift)
     return Audited(f"{case.name}, trained on {case.trained_on}", thermal, plain, found), seconds
-
-
-def _figures(run: dict[str, Any]) -> list[float | None]:
-    coefficients = run["after"]["coefficients"] or {}
-    values = [coefficients.get(letter, {}).get("value") for letter in ("Q", "B", "N")]
-    keys = ("block_std_100s_deg_h", "allan_deviation_1h_deg_h")
-    return [*values, *(run["after"][key] for key in keys), *(run[key] for key in COLUMNS[5:])]
-
-
-def _medians(runs: list[dict[str, Any]]) -> list[float | None]:
-    """Return the median of each figure over the seeds that have it; None if most of them have none."""
-    columns = zip(*map(_figures, runs), strict=True)
-    known = [[value for value in column if value is not None] for column in columns]
-    return [float(np.median(values)) if 2 * len(values) > len(runs) else None for values in known]
-
-
-def _csv(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]]) -> str:
-    lines = [",".join(("method", "trained_on", "leaks", "refused", *COLUMNS, *PAPER_COLUMNS))]
-    for name, trained_on, *values in rows:
-        paper = TABLE_2.get(name, (None,) * 4)
-        verdicts = map(str, _verdicts(found[name, trained_on]))
-        lines.append(",".join([name, trained_on, *verdicts, *(_text(value) for value in (*values, *paper))]))
-    ours = {name for name, *_ in rows}
-    blank = ["" for _ in ("trained_on", "leaks", "refused", *COLUMNS)]
-    lines += [",".join([name, *blank, *map(_text, values)]) for name, values in TABLE_2.items() if name not in ours]
-    return "\n".join(lines) + "\n"
-
-
-def _verdicts(runs: list[dict[str, Any]]) -> tuple[int, int]:
-    """Return how many audits found a leak, and how many refused it for whatever reason."""
-    return sum(bool(run["leaks"]) for run in runs), sum(not run["passed"] for run in runs)
-
-
-def _shown(rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Return the rows of the page; the paper's methods that are not ours last."""
-    shown = []
-    for name, trained_on, *values in rows:
-        leaks, refused = _verdicts(found[name, trained_on])
-        known = {"method": name, "trained_on": trained_on, "leaks": leaks, "refused": refused}
-        shown.append({**known, **dict(zip(COLUMNS, values, strict=True))})
-    ours = {row["method"] for row in shown}
-    blank = {"trained_on": "", "leaks": None, "refused": None, **dict.fromkeys(COLUMNS)}
-    shown += [{"method": name, **blank} for name in TABLE_2 if name not in ours]
-    return [{**row, **_paper_of(row["method"])} for row in shown]
-
-
-def _paper_of(name: str) -> dict[str, float | None]:
-    _, b, n, _ = TABLE_2.get(name, (None,) * 4)
-    return {"paper_b": b, "paper_n": n}
-
-
-def _printed(
-    rows: list[tuple[Any, ...]], found: dict[tuple[str, str], list[dict[str, Any]]], seeds: int
-) -> Iterator[str]:
-    yield (
-        f"Table 2 on our data, median over {seeds} seed(s); B in deg/h, N in deg/sqrt(h), none where the noise "
-        "model does not describe the curve"
-    )
-    heads = ("B", "N", "paper B", "paper N", "drift /", "1 h/oracle", "slow gain", "step gain", "leaks", "refused")
-    yield f"{'method':31s}{'trained on':16s}" + "".join(f"{head:>11s}" for head in heads)
-    for name, trained_on, *values in rows:
-        at = dict(zip(COLUMNS, values, strict=True))
-        paper = TABLE_2.get(name, (None,) * 4)
-        shown = [at["bias_instability_deg_h"], at["angle_random_walk_deg_sqrt_h"], paper[1], paper[2]]
-        shown += [at[key] for key in ("drift_reduction", "oracle_ratio_1h", "least_gain_in_drift_band", "step_gain")]
-        verdicts = "".join(f"{n:>9d}/{seeds}" for n in _verdicts(found[name, trained_on]))
-        yield f"{name:31s}{trained_on:16s}" + "".join(f"{_short(value):>11s}" for value in shown) + verdicts
-
-
-def _text(value: float | None) -> str:
-    return "" if value is None else f"{value:.6g}"
-
-
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from testbed.compensation.ceemdan import ceemdan
 from testbed.compensation.entropy import multiscale_permutation_entropy, multiscale_sample_entropy
 from testbed.compensation.grouping import group_modes, mean_period
 from testbed.drift.quality import timed_means
@@ -72,23 +71,19 @@ class Decomposed:
     sample_rate_hz: float
 
     @classmethod
-    def of(cls, thermal: ThermalRecord, options: PaperOptions, seed: int) -> Decomposed:
-        """Return the modes of a record as the paper's pipeline has them.
+    def of(cls, modes: FloatArray, sample_rate_hz: float, options: PaperOptions) -> Decomposed:
+        """Return modes in the groups of the paper's pipeline.
 
         Parameters
         ----------
-        thermal : ThermalRecord
-            To decompose.
+        modes : ndarray, shape (n_mode + 1, n_time)
+            Fastest first, the residual last [rad/s].
+        sample_rate_hz : float
+            Rate of the samples [Hz].
         options : PaperOptions
             Of the pipeline.
-        seed : int
-            Of the added noise.
         """
-        fs = thermal.record.sample_rate_hz
-        modes = ceemdan(
-            thermal.record.rate, variant=options.variant, trials=options.trials, noise=options.noise, seed=seed
-        )
-        return cls(modes, group_modes(modes, fs, method=options.grouping), fs)
+        return cls(modes, group_modes(modes, sample_rate_hz, method=options.grouping), sample_rate_hz)
 
     def group_of(self, mode: int) -> str:
         """Return the name of the group that a row belongs to."""

@@ -11,6 +11,7 @@ import pytest
 
 from testbed.errors import VerdictWarning
 from testbed.fusion import estimate
+from testbed.fusion.analysis.finding import UNITS
 from testbed.fusion.analysis.remedy import remedied
 from testbed.fusion.analysis.verdict import verdict
 from testbed.fusion.belief import load_belief
@@ -144,6 +145,37 @@ def test_gaps_repeats_and_ends_of_the_range(moving):
     z[100_000:100_004] = 31.0 * DEG
     found = verdict(readings | {"mhd_ars": z}, time_ns, EQ39)
     assert ("saturation", "mhd_ars") in kinds(found)
+
+
+@pytest.mark.parametrize(
+    ("said", "wrote", "factor"), [("deg/s", "deg/h", 3600.0), ("deg/s", "rad/s", DEG), ("deg/h", "deg/s", 1.0 / 3600.0)]
+)
+def test_a_unit_that_was_said_wrong_is_told_from_all_others(moving, said, wrote, factor):
+    """3600 is no unit against rad/s, but arcmin/s is within 5 % of it."""
+    readings, time_ns = moving
+    spoilt = readings | {"mems_gyro": factor * readings["mems_gyro"]}
+    found = verdict(spoilt, time_ns, EQ39, {"mems_gyro": UNITS[said]})
+    assert kinds(found) == [("unit", "mems_gyro")]
+    assert found.findings[0].value == pytest.approx(factor, rel=1e-12)
+    assert f"it reads in {wrote}, not in {said}: divide its readings by {factor:.6g}" in str(found.findings[0])
+
+
+def test_what_is_cut_off_at_the_end_of_the_range_is_neither_noise_nor_stuck():
+    _, readings = record(ramped(lambda t: 40.0 * four(t)), DURATION, 7)
+    limit = EQ39["mhd_ars"].range
+    cut = readings | {"mhd_ars": np.clip(readings["mhd_ars"], -limit, limit)}
+    found = verdict(cut, stamps_of(cut), EQ39)
+    assert ("saturation", "mhd_ars") in kinds(found)
+    assert not {("repeats", "mhd_ars"), ("belief", "mhd_ars")} & set(kinds(found))
+
+
+def test_sensors_that_were_swapped_are_told(moving):
+    readings, time_ns = moving
+    names = {"mhd_ars": "mems_gyro", "mems_gyro": "mhd_ars"}
+    found = verdict(*({names[key]: one for key, one in each.items()} for each in (readings, time_ns)), EQ39)
+    assert len(found.findings) == 1
+    assert found.findings[0].kind in {"belief", "bandwidth"}
+    assert "the readings of mems_gyro are as is believed of mhd_ars" in found.findings[0].remedy
 
 
 def test_missing_stamps_are_gaps_as_missing_readings_are(moving):

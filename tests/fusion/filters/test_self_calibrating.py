@@ -27,6 +27,11 @@ def still(t):
     return np.zeros_like(t)
 
 
+def fast(t):
+    """Lines as a wheel's, 17 deg/s^2 of change in all."""
+    return 0.02 * DEG * sum(np.sin(2.0 * np.pi * f * t) for f in (40.0, 80.0, 120.0))
+
+
 @functools.cache
 def spoilt(change="", seconds=8.0, motion=ten):
     """Return the rate and the readings with an MHD ARS of another gain or delay."""
@@ -74,6 +79,26 @@ def test_gain_and_delay_are_found_and_taken_out(change, gain, delay):
     alone = error(estimate("kalman", readings, **given, **INNER["kalman"]), rate)
     right = error(estimate("kalman", spoilt()[1], **given, **INNER["kalman"]), rate)
     assert error(found, rate) < 1.2 * right + 4e-4 < alone
+
+
+@pytest.mark.oracle
+def test_a_delay_on_fast_lines_is_known_as_well_as_the_record_tells():
+    """Fisher information of T seconds: T <w'^2> / S, S the density of the gyro's noise. What is left is what the filter
+    inside leaves that was told of the delay: it has to foresee the lines.
+    """
+    rate, readings = spoilt("delay", motion=fast)
+    quick = {"order": 3, "q": 1e12 * DEG**2}
+    found = built(filter={"kalman": quick}).process(readings)
+    delay, std = (found.diagnostics[name][-1] for name in ("delay", "delay_std"))
+    change = sum((2.0 * np.pi * f * 0.02 * DEG) ** 2 / 2.0 for f in (40.0, 80.0, 120.0))
+    # In the eighth second it knows seven, whose ends have half the weight; the ramp takes a little of the first.
+    information = 6.0 * change / EQ39["mems_gyro"].input_noise ** 2 + 5e-4**-2
+    assert std == pytest.approx(information**-0.5, rel=0.02, abs=0.0)
+    assert abs(delay + 0.5e-3) < 3.0 * std
+    late = EQ39 | {"mhd_ars": EQ39["mhd_ars"].model_copy(update={"delay": 0.5e-3})}
+    given = {"sample_rate_hz": RATES, "verdict": False}
+    told, not_told = (estimate("kalman", readings, belief=one, **given, **quick) for one in (late, EQ39))
+    assert error(found, rate) < 1.05 * error(told, rate) < 0.85 * error(not_told, rate)
 
 
 def test_at_rest_it_is_the_filter_inside():
