@@ -225,9 +225,9 @@ def _find_torque(parameters: TurntableParameters, torque: float, document: Docum
         document.find(
             ("turntable", "digital", "encoder_bits"),
             f"one count of the encoder, {1e6 * digital.resolution:.3g} urad, times the gain of the loop, "
-            f"{count / digital.resolution:.3g} N m/rad, is a torque of {count:.3g} N m, in all {torque:.3g} N m of the "
-            f"motor's {limit:g} N m, also at standstill: take more bits, or a lower rate_bandwidth or "
-            "position_bandwidth",
+            f"{count / digital.resolution:.3g} N m/rad, is a torque of {count:.3g} N m, in all "
+            f"{torque:.3g} N m where the motor has {limit:g} N m, also at standstill: take more bits, or a lower "
+            "rate_bandwidth or position_bandwidth",
         )
         return
     document.find(
