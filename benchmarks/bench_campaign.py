@@ -3,13 +3,18 @@
 CPU seconds of `testbed.evaluate` on the mixed scenario (20 s, three filters, modal plant) with 2 and with 34 seeds: the
 difference is what a further seed costs, and 1000 seeds are extrapolated from both. Lanes: nanoseconds per lane and
 step, of filters that share one covariance and of filters that have their own, readings and estimates moved to and from
-each lane's arrays included. Run:
+each lane's arrays included, and CPU seconds that the compiler takes for their generated kernels, in a process whose
+cache folder is empty. Run:
 python benchmarks/bench_campaign.py [--seeds 34]
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from copy import deepcopy
 from pathlib import Path
@@ -65,6 +70,32 @@ def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> float:
     return 1e9 * seconds(task, 7) / (N_TIME * len(filters))
 
 
+def compile_s(name: str, **parameters: Any) -> float:
+    """Return what compiling the lanes of a filter of five states takes [CPU s]."""
+    with tempfile.TemporaryDirectory() as cache:
+        call = f"import bench_campaign as b; print(b.compiled_here({name!r}, **{parameters!r}))"
+        place = {"XDG_CACHE_HOME": cache, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path[1:]])}
+        command = [sys.executable, "-c", call]
+        return float(subprocess.run(command, env={**os.environ, **place}, check=True, stdout=subprocess.PIPE).stdout)
+
+
+def compiled_here(name: str, **parameters: Any) -> float:
+    """Return what the first block of lanes takes over the second one [CPU s]; what ships compiled is loaded before."""
+    kind = resolve("filter", name, FILTERS)
+    first = kind(default_belief(), RATES, kind.Parameters(**parameters))
+    filters = [deepcopy(first) for _ in range(LANES)]
+    given = {sensor: np.zeros(round(N_TIME * rate / 20_000.0)) for sensor, rate in RATES.items()}
+    first.process(given)
+    lanes = Together(first)._lanes
+    assert lanes is not None
+    received = [one.received(given) for one in filters]
+    begin = time.process_time()
+    lanes.advance(filters, received, range(LANES))
+    between = time.process_time()
+    lanes.advance(filters, received, range(LANES))
+    return 2.0 * between - begin - time.process_time()
+
+
 def main() -> None:
     """Print the costs and the promises."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -79,6 +110,8 @@ def main() -> None:
     # A truth is played once for 128 seeds.
     thousand = 1000 * further + np.ceil(1000 / 128) * max(few - 2 * further, 0.0)
     print(f"2 seeds {few:.3f} CPU s, {most} seeds {many:.3f} CPU s; 1000 seeds are extrapolated")
+    shared, own = compile_s("kalman", coloured=False), compile_s("shakf")
+    print(f"compiling lanes of five states: {shared:.1f} CPU s with a shared covariance, {own:.1f} with their own")
     conclude(
         Promise("a further seed x 3 filters x 20 s, modal plant [CPU s]", 0.06, further),
         Promise("1000 seeds x 3 filters x 20 s, modal plant, extrapolated [CPU s]", 60.0, float(thousand)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -48,6 +49,18 @@ def play(task: Task) -> list[dict[str, Any]]:
     return [row for seed, one in zip(task.seeds, found, strict=True) for row in rows_of(task.case, seed, one)]
 
 
+def play_packed(packed: bytes) -> list[dict[str, Any]]:
+    """Return the rows of a task that was packed by `pickle`, which a scheduler passes on without opening it.
+
+    Parameters
+    ----------
+    packed : bytes
+        The task.
+    """
+    task: Task = pickle.loads(packed)
+    return play(task)
+
+
 class Agenda:
     """Hands out tasks until every case is done; a case with a precision gets chunk after chunk until it has it.
 
@@ -61,6 +74,8 @@ class Agenda:
         Cases and seeds whose rows are there already.
     squares : mapping of (int, int) to mapping of str to float, optional
         Mean square errors of the filters [deg^2/s^2] so far, by case and seed, then by source.
+    failed : iterable of int, optional
+        Cases of which a run has failed already: they get no further chunk.
     """
 
     def __init__(
@@ -68,15 +83,15 @@ class Agenda:
         study: Study,
         done: Iterable[tuple[int, int]],
         squares: Mapping[tuple[int, int], Mapping[str, float]] | None = None,
+        failed: Iterable[int] = (),
     ) -> None:
         self.study = study
         self._done: dict[int, set[int]] = {}
         for number, seed in done:
             self._done.setdefault(number, set()).add(seed)
         self._squares = {key: dict(known) for key, known in (squares or {}).items()}
-        self._failed: set[int] = set()
+        self._failed = set(failed)
         self._waiting: deque[Task] = deque()
-        self.open = 0
         for case in study.cases:
             self._continue(case, 0)
 
@@ -87,10 +102,7 @@ class Agenda:
 
     def next(self) -> Task | None:
         """Return a task, None if none waits now."""
-        if not self._waiting:
-            return None
-        self.open += 1
-        return self._waiting.popleft()
+        return self._waiting.popleft() if self._waiting else None
 
     def finish(self, task: Task, rows: Iterable[Mapping[str, Any]]) -> None:
         """Take the rows of a task.
@@ -102,7 +114,6 @@ class Agenda:
         rows : iterable of mapping
             What came of it.
         """
-        self.open -= 1
         for row in rows:
             if row["status"] == FAILED:
                 self._failed.add(task.case.number)

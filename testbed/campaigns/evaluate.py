@@ -78,13 +78,24 @@ def evaluate(
 
 def _play(cases: Sequence[Scenario], group: Sequence[int], seeds: Sequence[int]) -> dict[tuple[int, int], RunMetrics]:
     """Return the metrics by number of the case and seed."""
-    if any(sensor.clocked(cases[i].base_rate_hz) for i in group for sensor in cases[i].sensors.values()):
+    if any(by_itself(cases[i]) for i in group):
         return {(i, seed): _alone(cases[i].with_seed(seed)) for i in group for seed in seeds}
     lockstep = Lockstep([cases[i] for i in group], seeds)
     for n_time in block_lengths(cases[group[0]]):
         lockstep.advance(n_time)
     made_by = versions()
     return {(number, seed): lockstep.metrics(i, seed, made_by) for i, number in enumerate(group) for seed in seeds}
+
+
+def by_itself(scenario: Scenario) -> bool:
+    """Return whether every seed of a scenario is played by itself: its sensors have clocks of their own.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Which.
+    """
+    return any(sensor.clocked(scenario.base_rate_hz) for sensor in scenario.sensors.values())
 
 
 def _alone(scenario: Scenario) -> RunMetrics:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.many import ManyFilters, ManySensors
 from testbed.chain.instruments import sample_rates
 from testbed.chain.pointing import LinesOfSight
 from testbed.chain.truth import Truth
+from testbed.fusion.lanes.pack import Buffers
 from testbed.judging.case import CaseFacts
 from testbed.judging.judge import Judge
 from testbed.runs.block import RunBlock
@@ -43,9 +46,15 @@ class Lockstep:
         self._seeds, self._truth = seeds, Truth(cases[0])
         self._sensors: list[tuple[Any, ManySensors]] = []
         self._filters: list[tuple[Any, ManyFilters]] = []
+        self._buffers = Buffers()
         # Of each case the numbers of its stages by their names.
         self._reads = [self._find_sensors(case) for case in cases]
         self._estimates = [self._find_filters(case, reads) for case, reads in zip(cases, self._reads, strict=True)]
+        # Of each filter its name, and the numbers of the cases that have it.
+        self._users = [
+            (name, [i for i, made in enumerate(self._estimates) if made.get(name) == number])
+            for number, ((name, *_), _) in enumerate(self._filters)
+        ]
         rates = [sample_rates(case) for case in cases]
         self._common = [CaseFacts(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
         self._sights = {
@@ -67,7 +76,9 @@ class Lockstep:
         begin = case.frame.fusion_from
         return {
             name: _number(
-                self._filters, (name, spec, reads, begin), lambda name=name: ManyFilters(case, name, self._seeds)
+                self._filters,
+                (name, spec, reads, begin),
+                lambda name=name: ManyFilters(case, name, self._seeds, self._buffers),
             )
             for name, spec in case.fusion.items()
         }
@@ -81,36 +92,62 @@ class Lockstep:
             How many.
         """
         command, truth = self._truth.process(n_time)
+        block = RunBlock(command.start, command, truth, {}, {}, {})
         for case in self._common:
-            case.write(RunBlock(command.start, command, truth, {}, {}, {}))
+            case.write(block)
         for _, sensor in self._sensors:
             sensor.take(truth)
         for k in range(0, len(self._seeds), _PACK):
-            pack = self._seeds[k : k + _PACK]
-            readings = [sensor.readings(pack) for _, sensor in self._sensors]
-            estimates = self._estimated(readings, pack)
-            for i, (reads, made) in enumerate(zip(self._reads, self._estimates, strict=True)):
-                for j, seed in enumerate(pack):
-                    sensed = {name: readings[at][j] for name, at in reads.items()}
-                    found = {name: estimates[at][j] for name, at in made.items()}
-                    rates = {name: estimate.rate for name, estimate in found.items()}
-                    sight = self._sights[i, seed].process(truth.rate, truth.sensor_rate, sensed, rates)
-                    block = RunBlock(command.start, command, truth, sensed, found, {}, pointing=sight)
-                    self._judges[i, seed].write(block)
+            self._judge(block, self._seeds[k : k + _PACK])
 
-    def _estimated(self, readings: Sequence[list[FloatArray]], pack: Sequence[int]) -> list[list[EstimateBlock]]:
-        """Return the estimates of each filter; those that receive the same of the same readings do so once."""
-        estimates: list[list[EstimateBlock]] = []
+    def _judge(self, block: RunBlock, pack: Sequence[int]) -> None:
+        """Judge some seeds: their readings, then one filter after the other, then what all of them leave of the line
+        of sight. No more than the estimates of one filter are there at a time.
+        """
+        readings = [sensor.readings(pack) for _, sensor in self._sensors]
+        sensed = {
+            (i, seed): {name: readings[at][j] for name, at in reads.items()}
+            for i, reads in enumerate(self._reads)
+            for j, seed in enumerate(pack)
+        }
+        for key, given in sensed.items():
+            self._judges[key].write(replace(block, sensors=given))
+        rates: dict[tuple[int, int], dict[str, FloatArray]] = {key: {} for key in sensed}
         known: dict[Any, list[Received]] = {}
-        for (_, _, reads, _), stage in self._filters:
-            given, received = {name: readings[i] for name, i in reads.items()}, None
-            if stage.front is not None:
-                key = (stage.front, *reads.items())
-                if key not in known:
-                    known[key] = stage.received(given, pack)
-                received = known[key]
-            estimates.append(stage.process(given, pack, received))
-        return estimates
+        for number, (name, users) in enumerate(self._users):
+            estimates = self._estimated(number, readings, pack, known)
+            for i, (seed, estimate) in product(users, zip(pack, estimates, strict=True)):
+                self._judges[i, seed].write(replace(block, fusion={name: estimate}))
+                if name in self._sights[i, seed].names:
+                    rates[i, seed][name] = estimate.rate.copy()  # it holds until the next filter works
+        for key, given in sensed.items():
+            truth = block.truth
+            sight = self._sights[key].process(truth.rate, truth.sensor_rate, given, rates[key])
+            self._judges[key].write(replace(block, pointing=sight))
+
+    def _estimated(
+        self,
+        number: int,
+        readings: Sequence[list[FloatArray]],
+        pack: Sequence[int],
+        known: dict[Any, list[Received]],
+    ) -> list[EstimateBlock]:
+        """Return the estimates of a filter; those that receive the same of the same readings do so once, and it is
+        `known` from then on.
+        """
+        (_, _, reads, _), stage = self._filters[number]
+        given = {name: readings[i] for name, i in reads.items()}
+        if stage.front is None:
+            return stage.process(given, pack)
+        key = (stage.front, *reads.items())
+        if key not in known:
+            known[key] = stage.received(given, pack)
+        return stage.process(given, pack, known[key])
+
+    def foresee(self) -> None:
+        """Work out ahead what the metrics of all seeds share and no signal is needed for."""
+        for case in self._common:
+            case.foresee()
 
     def metrics(self, case: int, seed: int, versions: Mapping[str, str]) -> RunMetrics:
         """Return the metrics of a case under a seed.

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from testbed.fusion.base import EstimateBlock, Received
+    from testbed.fusion.lanes.pack import Buffers
     from testbed.models.turntable.truth import TruthBlock
     from testbed.scenario.model import Scenario
     from testbed.sensors.stages import SensorStage
@@ -95,9 +96,11 @@ class ManyFilters:
         Of the filter.
     seeds : sequence of int
         Of the noise.
+    buffers : Buffers
+        For the estimates, shared with filters whose estimates are not needed at the same time.
     """
 
-    def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int]) -> None:
+    def __init__(self, scenario: Scenario, name: str, seeds: Sequence[int], buffers: Buffers) -> None:
         spec = scenario.fusion[name]
         self._shipped = spec.type in FILTERS
         # Filters with an equal one receive the same of equal readings; None has what nobody else has.
@@ -107,7 +110,7 @@ class ManyFilters:
             first = spec.start(rates)
             # Some design their gains before they start.
             self._stages = {seed: deepcopy(first) for seed in seeds}
-            self._together = Together(first)
+            self._together = Together(first, buffers)
             self._onsets = {seed: Onset(scenario) for seed in seeds if scenario.frame.fusion_from}
             self.front = None if self._onsets else first.front()
         else:
@@ -125,7 +128,7 @@ class ManyFilters:
         received: Sequence[Received] | None = None,
     ) -> list[EstimateBlock]:
         """Return the estimates over a block under some of the seeds; of the diagnostics at least innovations, their
-        variances and counts of the gate. They hold until the next call.
+        variances and counts of the gate. They hold until the next call of any that shares the buffers.
 
         Parameters
         ----------

@@ -5,28 +5,41 @@ from __future__ import annotations
 import contextlib
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from testbed.campaigns.agenda import CHUNK
+from testbed.campaigns.evaluate import by_itself
 from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.forecast import memory_so_far
+from testbed.chain.pipeline import Chain
 
 if TYPE_CHECKING:
-    from testbed.campaigns.study import Study
+    from collections.abc import Callable, Sequence
 
+    from testbed.campaigns.study import Study
+    from testbed.scenario.model import Scenario
+
+T = TypeVar("T")
 # Base samples that are played to see how long they take, after as many that compile.
 _TRIED = 4000
-# Of a row on the disk, and of the page's share of it [byte].
-_ROW_BYTES = 400
+# On the disk [byte]: a row; a point of the page, with its place in the figures; the page without any; a case.
+_ROW, _POINT, _PAGE, _CASE = 60, 600, 150_000, 300
+# Of each process of a cluster beside those that play: the scheduler, and who watches over a worker [byte].
+_WATCHER = 60_000_000
+# From the start of a cluster until its workers play [s].
+_BEGIN = 6.0
 
 
 @dataclass(frozen=True)
 class Size:
-    """About what a sweep takes: `runs` at the most, processor time [s], memory and disk [byte]."""
+    """About what a sweep takes, compilation apart: `runs` at the most, processor time and time on so many processors as
+    workers [s], memory and disk [byte].
+    """
 
     cases: int
     runs: int
     cpu_seconds: float
+    seconds: float
     memory_bytes: int
     disk_bytes: int
 
@@ -39,14 +52,14 @@ def warm(study: Study) -> None:
     study : Study
         What will be played.
     """
-    scenario = study.cases[0].scenario
     # A case that fails is a row with its reason, which whoever plays it writes.
     with contextlib.suppress(Exception):
-        Lockstep([scenario], study.seeds[:1]).advance(min(_TRIED, scenario.n_time))
+        _tried(study.cases[0].scenario, study.seeds[:1])
 
 
 def size_of(study: Study, workers: int = 1) -> Size:
-    """Play the first moments of the first case under the seeds of one task, and return what all of it takes.
+    """Play the first moments of the first and the last case under the seeds of one task, and return what all of it
+    takes.
 
     Parameters
     ----------
@@ -60,25 +73,45 @@ def size_of(study: Study, workers: int = 1) -> Size:
     RunError
         If it fails already there.
     """
-    scenario, seeds = study.cases[0].scenario, study.seeds[:CHUNK]
-    begun = time.process_time()
-    lockstep = Lockstep([scenario], seeds)
-    tried = max(1, min(_TRIED, scenario.n_time // 2))
-    start = time.process_time() - begun
-    lockstep.advance(tried)
-    begun = time.process_time()
-    lockstep.advance(min(tried, scenario.n_time - tried) or tried)
-    per_sample = (time.process_time() - begun) / tried
-    chunks = len(study.cases) * -(-len(study.seeds) // CHUNK)
-    share = len(study.seeds) / (CHUNK * -(-len(study.seeds) // CHUNK))
-    rows = len(study.cases) * len(study.seeds) * (len(scenario.sensors) + len(scenario.fusion))
+    warm(study)
+    cases, seeds = study.cases, study.seeds[:CHUNK]
+    tried = [_tried(case.scenario, seeds) for case in (cases[0], cases[-1])[: len(cases)]]
+    chunks, share = -(-len(study.seeds) // CHUNK), len(study.seeds) / len(seeds)
+    # What the first case finds out the others need not, as far as they are like it: the last one tells.
+    starts = tried[0][0] + (len(cases) * chunks - 1) * tried[-1][0]
+    per_sample = sum(each for _, each in tried) / len(tried)
+    cpu = starts + share * per_sample * sum(case.scenario.n_time for case in cases)
+    sources = max(len(case.scenario.sensors) + len(case.scenario.fusion) for case in (cases[0], cases[-1]))
+    points, each = len(cases) * sources, memory_so_far()
+    alone = workers == 1
     return Size(
-        cases=len(study.cases),
-        runs=len(study.cases) * len(study.seeds),
-        cpu_seconds=chunks * (start + share * per_sample * scenario.n_time),
-        memory_bytes=workers * memory_so_far(),
-        disk_bytes=_ROW_BYTES * rows,
+        cases=len(cases),
+        runs=len(cases) * len(study.seeds),
+        cpu_seconds=cpu,
+        seconds=cpu if alone else _BEGIN + cpu / workers,
+        memory_bytes=each if alone else (1 + workers) * (each + _WATCHER),
+        disk_bytes=_PAGE + _CASE * len(cases) + points * (_POINT + _ROW * len(study.seeds)),
     )
+
+
+def _tried(scenario: Scenario, seeds: Sequence[int]) -> tuple[float, float]:
+    """Return what a task of a case takes once, and per base sample [s]."""
+    tried = min(_TRIED, scenario.n_time)
+    if by_itself(scenario):
+        once, chain = _spent(lambda: Chain(scenario))
+        each, _ = _spent(lambda: chain.tried(tried))
+        return len(seeds) * once, len(seeds) * each / tried
+    once, lockstep = _spent(lambda: Lockstep([scenario], seeds))
+    shared, _ = _spent(lockstep.foresee)
+    each, _ = _spent(lambda: lockstep.advance(tried))
+    return once + shared, each / tried
+
+
+def _spent(task: Callable[[], T]) -> tuple[float, T]:
+    """Return the processor time of a call [s], and what it returned."""
+    begun = time.process_time()
+    found = task()
+    return time.process_time() - begun, found
 
 
 def sweep_words(size: Size) -> str:
@@ -89,6 +122,10 @@ def sweep_words(size: Size) -> str:
     size : Size
         Of the sweep.
     """
-    spent = f"{size.cpu_seconds:.0f} s" if size.cpu_seconds < 600.0 else f"{size.cpu_seconds / 60.0:.0f} min"
     room = f"{size.memory_bytes / 1e6:.0f} MB of memory, {size.disk_bytes / 1e6:.3g} MB of disk"
-    return f"{size.cases} cases, at most {size.runs} runs, about {spent} of processor time, {room}"
+    spent = f"{_time(size.cpu_seconds)} of processor time in {_time(size.seconds)}"
+    return f"{size.cases} cases, at most {size.runs} runs, about {spent}, {room}"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 600.0 else f"{seconds / 60.0:.0f} min"

@@ -189,7 +189,7 @@ def _short(value: Any) -> str:
 
 
 def _locked(folder: Path) -> int:
-    handle = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT)
+    handle = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     if os.name == "posix":
         import fcntl
 

@@ -108,7 +108,7 @@ def sweep(
         raise ScenarioError([Problem(f"expected at least 1, got {workers}", "workers")])
     folder = Path("runs") / loaded.name if out is None else Path(out)
     with CaseStore(folder, loaded.document(), schema_of(loaded)) as store:
-        agenda = Agenda(loaded, store.done, _squares(folder) if loaded.precision is not None else None)
+        agenda = Agenda(loaded, store.done, *(_known(folder) if loaded.precision is not None else ()))
         told, page = Progress(agenda.runs, len(store.done)), Page(folder, loaded)
 
         def take(_task: Task, rows: list[dict[str, Any]]) -> None:
@@ -149,11 +149,12 @@ def open_sweep(folder: str | Path) -> pa.Table:
     return read_cases(Path(folder))
 
 
-def _squares(folder: Path) -> dict[tuple[int, int], dict[str, float]]:
-    """Return the mean squares of the filters that are there already, by case and seed."""
-    found: dict[tuple[int, int], dict[str, float]] = {}
-    rows = read_cases(folder)
-    for row in rows.to_pylist() if "rmse_deg_s" in rows.column_names else ():
+def _known(folder: Path) -> tuple[dict[tuple[int, int], dict[str, float]], set[int]]:
+    """Return the mean squares of the filters that are there already, by case and seed, and the cases that failed."""
+    columns = ["case", "seed", "kind", "source", "status", "rmse_deg_s"]
+    rows = read_cases(folder, columns).to_pylist()
+    squares: dict[tuple[int, int], dict[str, float]] = {}
+    for row in rows:
         if row["kind"] == "filter" and row["rmse_deg_s"] is not None:
-            found.setdefault((row["case"], row["seed"]), {})[row["source"]] = row["rmse_deg_s"] ** 2
-    return found
+            squares.setdefault((row["case"], row["seed"]), {})[row["source"]] = row["rmse_deg_s"] ** 2
+    return squares, {row["case"] for row in rows if row["status"] == FAILED}

@@ -31,10 +31,15 @@ class LinesOfSight:
         What runs.
     rates : mapping of str to float
         Sample rate [Hz] of ``base`` and of every sensor and filter by its name.
+
+    Attributes
+    ----------
+    names : list of str
+        The filters.
     """
 
     def __init__(self, scenario: Scenario, rates: Mapping[str, float]) -> None:
-        self._names = fed_forward(scenario)
+        self.names = fed_forward(scenario)
         pointing = scenario.pointing
         if pointing is None:
             return
@@ -48,7 +53,7 @@ class LinesOfSight:
             for name, sensor in scenario.sensors.items()
             if scenario.sensor_types[name] in SENSORS
         }
-        self._lines = {name: _Line(scenario, name, rates) for name in self._names}
+        self._lines = {name: _Line(scenario, name, rates) for name in self.names}
 
     def process(
         self,
@@ -68,7 +73,7 @@ class LinesOfSight:
         readings, estimates : mapping of str to ndarray, shape (n_due,)
             Of sensors and filters, those that fall due [rad/s].
         """
-        if not self._names:
+        if not self.names:
             return {}
         whole = self._true.process(truth, truth.size)
         clean = {name: stage.process(sensor_rate[name]) for name, stage in self._clean.items()}

@@ -111,6 +111,14 @@ class CaseFacts:
             "plugins": [asdict(plugin) for plugin in self.scenario.plugins],
         }
 
+    def foresee(self) -> None:
+        """Work out ahead what needs no signal: floors, and the optima of lines at the commanded frequencies."""
+        lines = tuple((freq, 1.0) for freq in self.scenario.lines if freq > 0.0)
+        self.pages  # noqa: B018 - it is kept
+        self.settled(lines)
+        for name in self.scenario.fusion:
+            self.of_run(lines, name)
+
     def reason(self, why: str | None) -> str | None:
         """Return why there is no floor or no optimum, `why` being what `settled` says."""
         return self._bounds.reason or why

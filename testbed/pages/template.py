@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import BytecodeCache, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from testbed.pages.numbers import bounded, fixed, plain, significant
@@ -14,7 +14,25 @@ from testbed.pages.svg import svg_text
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from jinja2.bccache import Bucket
     from matplotlib.figure import Figure
+
+
+class _Compiled(BytecodeCache):
+    """Templates as Jinja compiled them, for this process: that takes longer than filling one."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, bytes] = {}
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        if bucket.key in self._known:
+            bucket.bytecode_from_string(self._known[bucket.key])
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        self._known[bucket.key] = bucket.bytecode_to_string()
+
+
+_COMPILED = _Compiled()
 
 
 def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
@@ -35,6 +53,7 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        bytecode_cache=_COMPILED,
     )
     environment.globals["vendored"] = _vendored
     environment.filters |= {"significant": significant, "bounded": bounded, "fixed": fixed, "plain": plain}

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import pickle
 import subprocess
 import sys
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from distributed import KilledWorker
 
 import testbed
 from testbed.campaigns.agenda import CHUNK, Agenda, play
-from testbed.campaigns.engine import play_here
+from testbed.campaigns.engine import _finished, play_here
 from testbed.campaigns.rows import FAILED, rows_of, schema_of
 from testbed.campaigns.size import warm
 from testbed.campaigns.store import CASES, CaseStore, read_cases
@@ -183,6 +185,15 @@ def test_a_case_gets_chunks_until_its_error_is_known_and_the_order_of_others_cha
     assert again[1] | {seed for _, seed in known} == first[1]
 
 
+def test_a_case_that_has_failed_gets_no_further_chunk_after_a_stop_either(tmp_path):
+    """Nor does one that has failed under its first seed, of which no error is known."""
+    study = load_study(written(tmp_path, "seeds: {until: {rmse: 1 %}, most: 40}\n"))
+    done = [(0, seed) for seed in study.seeds[:CHUNK]]
+    squares = {(0, seed): {"kalman": 1.0 + seed} for _, seed in done[1:]}
+    assert Agenda(study, done, squares).next() is not None
+    assert Agenda(study, done, squares, [0]).next() is None
+
+
 def test_the_bias_of_stopping_early_is_small(tmp_path):
     """The mean square over the seeds that a precision asks for, over many campaigns, against the truth: within 5 %."""
     text = "seeds: {until: {rmse: 10 %}, most: 200}\n"
@@ -209,6 +220,56 @@ def test_one_process_and_two_workers_give_the_same_rows(done, tmp_path):
     assert subprocess.run([*command, "--quiet"], check=False).returncode == 0
     again = tmp_path / "out"
     assert read_cases(again).drop_columns("launch").equals(read_cases(folder).drop_columns("launch"))
+
+
+class Finished(list):
+    """What `distributed.as_completed` is of futures that are there at once."""
+
+    add = list.append
+
+    def __next__(self):
+        return self.pop(0)
+
+
+class Future:
+    """A task that was played, or that killed its workers."""
+
+    def __init__(self, task, *, dies):
+        self._task, self._dies = task, dies
+
+    def result(self):
+        if self._dies:
+            key = "play"
+            raise KilledWorker(key, None, 3)
+        return [{"case": self._task.case.number, "seed": seed, "status": "ok"} for seed in self._task.seeds]
+
+    def release(self):
+        pass
+
+
+def test_a_case_that_kills_its_workers_fails_alone(tmp_path, monkeypatch):
+    """The first one takes the second one with it, and does not when they are played alone; nothing else waits."""
+    study = load_study(written(tmp_path, "vary: {motion.0.sine.frequency: [5 Hz, 20 Hz, 30 Hz]}\nseeds: 2\n"))
+    submitted = []
+
+    class Client:
+        def submit(self, _play, packed, *, pure):
+            assert not pure
+            submitted.append(pickle.loads(packed))
+            number = submitted[-1].case.number
+            return Future(submitted[-1], dies=number == 0 or (number == 1 and len(submitted) <= 2))
+
+    monkeypatch.setattr("distributed.as_completed", Finished)
+    found = [row for _, rows in _finished(Client(), Agenda(study, ()), 3) for row in rows]
+    assert sorted((row["case"], row["seed"], row["status"]) for row in found) == [
+        *((0, seed, FAILED) for seed in (7, 8)),
+        *((case, seed, "ok") for case in (1, 2) for seed in (7, 8)),
+    ]
+    assert {row["reason"] for row in found if row["status"] == FAILED} == {
+        "4 workers died of it: out of memory, or a crash of compiled code"
+    }
+    assert [task.case.number for task in submitted[:3]] == [0, 1, 2]
+    assert sorted(task.case.number for task in submitted[3:]) == [0, 1]
 
 
 def test_a_scheduler_that_is_not_there_is_an_error_of_the_run(done, tmp_path, monkeypatch):

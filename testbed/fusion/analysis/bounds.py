@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.fusion.analysis.optimum import DECADES, CycleMap, FixedFilters, filters_from, period_map
+from testbed.fusion.analysis.optimum import DECADES, CycleMap, FixedFilters, FixedGains, filters_from, period_map
 from testbed.fusion.model import build_model
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class _Search:
         return [_bound(noise[i], lag[i, k], order, q[i]) for k, i in enumerate(at)]
 
 
-# The signal has no part in them, so that the cases of a campaign share them: a megabyte or two each.
+# The signal has no part in them, so that the cases of a campaign share them: half a megabyte each.
 @functools.lru_cache(maxsize=16)
 def _candidates(
     belief: tuple[tuple[str, SensorBelief], ...],
@@ -198,12 +198,13 @@ def _candidates(
     window: tuple[float, float] | None,
     order: int,
     q: tuple[float, ...],
-) -> tuple[FloatArray, list[tuple[float, FixedFilters]]]:
-    """Return what the sensors' noise leaves of each candidate [rad^2/s^2], and weights and filters of the window."""
-    noise, times = np.zeros(len(q)), list(_times(dict(belief), dict(sample_rate_hz), start, window, order, np.array(q)))
-    for weight, filters in times:
+) -> tuple[FloatArray, list[tuple[float, FixedGains]]]:
+    """Return what the sensors' noise leaves of each candidate [rad^2/s^2], and weights and gains of the window."""
+    noise, times = np.zeros(len(q)), list[tuple[float, FixedGains]]()
+    for weight, filters in _times(dict(belief), dict(sample_rate_hz), start, window, order, np.array(q)):
         low, high = np.split(filters.posterior()[:, :, 0, 0].mean(axis=0), 2)
         noise += weight * (0.5 * (low + high) - (high - low) / (2.0 * _HALF_STEP))
+        times.append((weight, FixedGains(filters.model, filters.K)))
     # Where the start's covariance swamps what is left of it, rounding may leave less than nothing: no candidate.
     return np.where(noise > 0.0, noise, np.inf), times
 

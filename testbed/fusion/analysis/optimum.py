@@ -28,25 +28,81 @@ _DOUBLINGS = 40
 
 
 @dataclass(frozen=True)
-class FixedFilters:
-    """Settled filters of one model that differ in q: their cycle of gains.
+class FixedGains:
+    """What settled filters of one model do to a signal: their cycle of gains.
 
     Parameters
     ----------
     model : FusionModel
         F, H, R, and Q without signal noise.
-    q : ndarray, shape (n_q,)
-        Signal noise of each filter [rad^2/s^(2m+1)].
-    prior : ndarray, shape (n_step, n_q, n_state, n_state)
-        Covariance before the readings of each step of the cycle [rad^2/s^2]; all sensors are due at step 0.
     K : ndarray, shape (n_step, n_q, n_state, n_sensor)
         Gains [-], zero for a sensor that is not due.
     """
 
     model: FusionModel
+    K: FloatArray
+
+    def line_error(self, freq_hz: FloatArray, responses: ComplexArray) -> FloatArray:
+        """Return rms over the cycle of |estimate/truth - 1| for a settled sine [-], shape (n_q, n_freq).
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequencies [Hz].
+        responses : ndarray of complex, shape (n_sensor, n_freq)
+            What the sensors truly do, G [-].
+        """
+        error: FloatArray = np.sqrt(np.mean(np.abs(self.gain(freq_hz, responses) - 1.0) ** 2, axis=0))
+        return error
+
+    def gain(self, freq_hz: FloatArray, responses: ComplexArray) -> ComplexArray:
+        r"""Return estimate over truth for a settled sine at each step of the cycle [-], shape (n_step, n_q, n_freq).
+
+        .. math:: X_p = e^{-j w T} (I - K_p H) F X_{p-1} + K_p G(j w)
+
+        Parameters
+        ----------
+        freq_hz : ndarray, shape (n_freq,)
+            Frequencies [Hz].
+        responses : ndarray of complex, shape (n_sensor, n_freq)
+            Readings over truth, G [-].
+        """
+        model, steps, n = self.model, len(self.K), self.model.F.shape[0]
+        turn = np.exp(-2j * np.pi * np.asarray(freq_hz) / model.sample_rate_hz)
+        M = (np.eye(n) - self.K @ model.H) @ model.F
+        driven = np.swapaxes(self.K @ responses, 2, 3)  # (n_step, n_q, n_freq, n_state)
+        around = np.broadcast_to(np.eye(n), M[0].shape)
+        X = np.zeros(driven[0].shape, complex)
+        for p in range(steps):
+            around = M[p] @ around
+            X = turn[:, None] * (X @ _t(M[p])) + driven[p]
+        system = np.eye(n) - (turn**steps)[None, :, None, None] * around[:, None]
+        X = np.linalg.solve(system, X[..., None])[..., 0]
+        gains = []
+        for p in range(steps):
+            X = turn[:, None] * (X @ _t(M[p])) + driven[p]
+            gains.append(X[..., 0])
+        return np.array(gains)
+
+
+@dataclass(frozen=True)
+class FixedFilters(FixedGains):
+    """Settled filters of one model that differ in q: their gains, and the covariance that they claim.
+
+    Parameters
+    ----------
+    model : FusionModel
+        As for `FixedGains`.
+    K : ndarray, shape (n_step, n_q, n_state, n_sensor)
+        As for `FixedGains`.
+    q : ndarray, shape (n_q,)
+        Signal noise of each filter [rad^2/s^(2m+1)].
+    prior : ndarray, shape (n_step, n_q, n_state, n_state)
+        Covariance before the readings of each step of the cycle [rad^2/s^2]; all sensors are due at step 0.
+    """
+
     q: FloatArray
     prior: FloatArray
-    K: FloatArray
 
     @property
     def std(self) -> FloatArray:
@@ -90,48 +146,6 @@ class FixedFilters:
                 variance += total[:, 0, 0]
             parts.append(variance / steps)
         return np.array(parts)
-
-    def line_error(self, freq_hz: FloatArray, responses: ComplexArray) -> FloatArray:
-        """Return rms over the cycle of |estimate/truth - 1| for a settled sine [-], shape (n_q, n_freq).
-
-        Parameters
-        ----------
-        freq_hz : ndarray, shape (n_freq,)
-            Frequencies [Hz].
-        responses : ndarray of complex, shape (n_sensor, n_freq)
-            What the sensors truly do, G [-].
-        """
-        error: FloatArray = np.sqrt(np.mean(np.abs(self.gain(freq_hz, responses) - 1.0) ** 2, axis=0))
-        return error
-
-    def gain(self, freq_hz: FloatArray, responses: ComplexArray) -> ComplexArray:
-        r"""Return estimate over truth for a settled sine at each step of the cycle [-], shape (n_step, n_q, n_freq).
-
-        .. math:: X_p = e^{-j w T} (I - K_p H) F X_{p-1} + K_p G(j w)
-
-        Parameters
-        ----------
-        freq_hz : ndarray, shape (n_freq,)
-            Frequencies [Hz].
-        responses : ndarray of complex, shape (n_sensor, n_freq)
-            Readings over truth, G [-].
-        """
-        model, steps, n = self.model, len(self.K), self.model.F.shape[0]
-        turn = np.exp(-2j * np.pi * np.asarray(freq_hz) / model.sample_rate_hz)
-        M = (np.eye(n) - self.K @ model.H) @ model.F
-        driven = np.swapaxes(self.K @ responses, 2, 3)  # (n_step, n_q, n_freq, n_state)
-        around = np.broadcast_to(np.eye(n), M[0].shape)
-        X = np.zeros(driven[0].shape, complex)
-        for p in range(steps):
-            around = M[p] @ around
-            X = turn[:, None] * (X @ _t(M[p])) + driven[p]
-        system = np.eye(n) - (turn**steps)[None, :, None, None] * around[:, None]
-        X = np.linalg.solve(system, X[..., None])[..., 0]
-        gains = []
-        for p in range(steps):
-            X = turn[:, None] * (X @ _t(M[p])) + driven[p]
-            gains.append(X[..., 0])
-        return np.array(gains)
 
 
 def settled_filters(
@@ -252,7 +266,7 @@ def filters_from(model: FusionModel, q: FloatArray, Q: FloatArray, prior: FloatA
         gains.append(K)
         keep = np.eye(len(model.F)) - K @ model.H
         P = model.F @ (keep @ P @ _t(keep) + (K * model.R) @ _t(K)) @ model.F.T + Q
-    return FixedFilters(model, q, np.array(priors), np.array(gains))
+    return FixedFilters(model, np.array(gains), q, np.array(priors))
 
 
 def _t(matrix: FloatArray) -> FloatArray:

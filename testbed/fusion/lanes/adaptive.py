@@ -24,6 +24,8 @@ _OWN = (
     *("increment_variance", "window_sum", "band"),
 )
 _ALIKE = ("power", "increments", "window_count")
+# What the kernel finds, and whether for each sensor.
+_FOUND = {"rate": False, "std": False, "innovation": True, "variance": True}
 
 
 class AdaptiveLanes:
@@ -33,15 +35,17 @@ class AdaptiveLanes:
     ----------
     example : SageHusa
         One of them.
+    buffers : Buffers
+        For their estimates.
     """
 
-    def __init__(self, example: SageHusa) -> None:
+    def __init__(self, example: SageHusa, buffers: Buffers) -> None:
         self._model, n = example, len(example._x)
         source, self._rows = adaptive_source(pattern_of(example))
         self._run = module_of(source).run
         self._half = np.tril_indices(n)
         self._states, self._own = slice(0, n), n + len(self._half[0])
-        self._buffers = Buffers({"rate": False, "std": False, "innovation": True, "variance": True})
+        self._buffers = buffers
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
         """Advance those filters of `whole` that count alike, and return their estimates by number.
@@ -61,7 +65,8 @@ class AdaptiveLanes:
         alike = [m for m in whole if _alike(filters[m], filters[whole[0]])]
         done: dict[int, EstimateBlock] = {}
         for number, pack in enumerate(packs(alike)):
-            done |= self._pack(filters, received, pack, due, self._buffers.of(due, number))
+            arrays = self._buffers.of(due, number, len(pack), _FOUND)
+            done |= self._pack(filters, received, pack, due, arrays)
         return done
 
     def _pack(

@@ -44,20 +44,17 @@ def pattern_of(one: ModelFilter | SteadyState) -> Pattern:
 
 
 class Buffers:
-    """Arrays of a block for some packs, used again in the next one; NaN where nothing was written.
+    """Arrays of a block, used again in the next one and by all filters that share them; NaN where nothing was written.
 
-    Parameters
-    ----------
-    names : mapping of str to bool
-        Which there are, and whether each sensor has one.
+    What one filter leaves in them holds until the next one works, of the same block or of the next.
     """
 
-    def __init__(self, names: Mapping[str, bool]) -> None:
-        self._names, self._due = dict(names), np.zeros((0, 0), dtype=np.bool_)
-        self._arrays: list[dict[str, FloatArray]] = []
+    def __init__(self) -> None:
+        self._due = np.zeros((0, 0), dtype=np.bool_)
+        self._arrays: dict[tuple[str, int], FloatArray] = {}
 
-    def of(self, due: Any, number: int) -> dict[str, FloatArray]:
-        """Return the arrays of a pack, shape (LANES, n_time) or (LANES, n_sensor, n_time).
+    def of(self, due: Any, number: int, lanes: int, names: Mapping[str, bool]) -> dict[str, FloatArray]:
+        """Return the arrays of a pack, shape (lanes, n_time) or (lanes, n_sensor, n_time).
 
         Parameters
         ----------
@@ -65,13 +62,21 @@ class Buffers:
             Which readings there are.
         number : int
             Of the pack.
+        lanes : int
+            How many of the pack are kept; the last ones of a padded pack are not.
+        names : mapping of str to bool
+            Which there are, and whether each sensor has one.
         """
         if not np.array_equal(due, self._due):
-            self._due, self._arrays = due.copy(), []
-        while len(self._arrays) <= number:
-            one, each = (LANES, due.shape[1]), (LANES, *due.shape)
-            self._arrays.append({name: np.full(each if many else one, np.nan) for name, many in self._names.items()})
-        return self._arrays[number]
+            self._due, self._arrays = due.copy(), {}
+        shapes = {name: due.shape if many else due.shape[1:] for name, many in names.items()}
+        return {name: self._one((name, number), lanes, shape) for name, shape in shapes.items()}
+
+    def _one(self, key: tuple[str, int], lanes: int, shape: tuple[int, ...]) -> FloatArray:
+        known = self._arrays.get(key)
+        if known is None or len(known) < lanes:
+            known = self._arrays[key] = np.full((lanes, *shape), np.nan)
+        return known[:lanes]
 
 
 def block_of(

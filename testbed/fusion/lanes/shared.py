@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from testbed.fusion.lanes.settling import SettlingGains
     from testbed.signals import FloatArray
 
+# What the kernel finds, and whether for each sensor.
+_FOUND = {"rate": False, "innovation": True}
+
 
 class SharedLanes:
     """Filters with one covariance as long as none has a gap of its own.
@@ -31,14 +34,18 @@ class SharedLanes:
         One of them.
     kind : type
         What their gains are: `KalmanGains` or one like it.
+    buffers : Buffers
+        For their estimates.
     """
 
-    def __init__(self, example: Kalman | SteadyState, kind: type[KalmanGains | SettlingGains]) -> None:
+    def __init__(
+        self, example: Kalman | SteadyState, kind: type[KalmanGains | SettlingGains], buffers: Buffers
+    ) -> None:
         self._model, self._kind = example.model, kind
         source, self._rows = shared_source(pattern_of(example))
         self._run = module_of(source).run
         self._gains_of = gains_kernel(len(example._x), len(self._model.H), self._model.n_slow)
-        self._buffers = Buffers({"rate": False, "innovation": True})
+        self._buffers = buffers
         self._gains: KalmanGains | SettlingGains | None = None
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
@@ -61,7 +68,8 @@ class SharedLanes:
         alike = [m for m in whole if gains.hold(filters[m], due)] if gains.usable else []
         done: dict[int, EstimateBlock] = {}
         for number, pack in enumerate(packs(alike)):
-            done |= self._pack(filters, received, pack, gains, self._buffers.of(due, number))
+            arrays = self._buffers.of(due, number, len(pack), _FOUND)
+            done |= self._pack(filters, received, pack, gains, arrays)
         return done
 
     def _gains_for(self, first: Any, due: Any) -> KalmanGains | SettlingGains:

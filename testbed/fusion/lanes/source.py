@@ -47,7 +47,7 @@ def spread(Z, i, begin, n, first, stride, z):
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def collect(part, first, stride, found):
-    for s in range({LANES}):
+    for s in range(found.shape[0]):
         for k in range(first, found.shape[1], stride):
             found[s, k] = part[k, s]
 
@@ -150,9 +150,9 @@ def shared_source(pattern: Pattern) -> tuple[str, list[str]]:
     """Return the source of run(F, H, W, gains, variance, due, started, Z, rate, innovation), and the rows of its W.
 
     States of lanes that share one covariance: `gains` (n_time, n_sensor, n) and `variance` (n_time, n_sensor) belong to
-    the readings that are `due` (n_sensor, n_time). Z are LANES arrays (n_sensor, n_time), `innovation` is (LANES,
-    n_sensor, n_time), `rate` (LANES, n_time). The row ``worst`` holds the largest squared innovation over that of the
-    gate.
+    the readings that are `due` (n_sensor, n_time). Z are LANES arrays (n_sensor, n_time), `innovation` is (n_lane,
+    n_sensor, n_time), `rate` (n_lane, n_time), for as many of the first lanes as are wanted. The row ``worst`` holds
+    the largest squared innovation over that of the gate.
 
     Parameters
     ----------
@@ -195,7 +195,8 @@ def adaptive_source(pattern: Pattern) -> tuple[str, list[str]]:
     The Sage-Husa family with R that adapts, a covariance per lane in Joseph form. `windows` (n_sensor, n_window, LANES)
     holds the squared innovations of the sliding windows, `common` (n_sensor,) one SENSOR record per sensor with what
     all lanes have in common, `seen` (n_sensor,) how many readings there were. Z are LANES arrays (n_sensor, n_time),
-    `innovation` and its `variance` are (LANES, n_sensor, n_time), `rate` and `std` (LANES, n_time).
+    `innovation` and its `variance` are (n_lane, n_sensor, n_time), `rate` and `std` (n_lane, n_time), for as many of
+    the first lanes as are wanted.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from testbed.fusion.filters.shakf import SageHusa
 from testbed.fusion.filters.steady_state import SteadyState
 from testbed.fusion.kernels.covariance import JOSEPH
 from testbed.fusion.lanes.adaptive import AdaptiveLanes
+from testbed.fusion.lanes.pack import Buffers
 from testbed.fusion.lanes.settling import SettlingGains
 from testbed.fusion.lanes.shared import KalmanGains, SharedLanes
 
@@ -35,19 +36,23 @@ class Together:
     ----------
     example : BlockFilter
         One of them.
+    buffers : Buffers, optional
+        Shared with other kinds whose estimates are not needed at the same time; else these have their own.
     """
 
-    def __init__(self, example: BlockFilter) -> None:
+    def __init__(self, example: BlockFilter, buffers: Buffers | None = None) -> None:
         self._lanes: SharedLanes | AdaptiveLanes | None = None
+        buffers = buffers or Buffers()
         if isinstance(example, Kalman) and _plain(example):
-            self._lanes = SharedLanes(example, KalmanGains)
+            self._lanes = SharedLanes(example, KalmanGains, buffers)
         elif isinstance(example, SteadyState):
-            self._lanes = SharedLanes(example, SettlingGains)
+            self._lanes = SharedLanes(example, SettlingGains, buffers)
         elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
-            self._lanes = AdaptiveLanes(example)
+            self._lanes = AdaptiveLanes(example, buffers)
 
     def process(self, filters: Sequence[BlockFilter], received: Received) -> list[EstimateBlock]:
-        """Return what each filter gives for its readings of a block; it holds until the next one.
+        """Return what each filter gives for its readings of a block; it holds until the next one of those that share
+        the buffers.
 
         Parameters
         ----------

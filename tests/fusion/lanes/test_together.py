@@ -13,6 +13,7 @@ from testbed.fusion import FILTERS
 from testbed.fusion.belief import default_belief
 from testbed.fusion.kernels.covariance import EVERY, MODE, RECURSION, SETTLED
 from testbed.fusion.lanes import module
+from testbed.fusion.lanes.pack import Buffers
 from testbed.fusion.lanes.source import LANES
 from testbed.fusion.lanes.together import Together
 from testbed.parts import resolve
@@ -123,6 +124,32 @@ def test_gains_that_settle_on_the_way_are_those_of_the_kernel(rng):
             assert np.array_equal(one._last, other._last)
         seen.append(int(lanes[0]._progress[MODE]))
     assert {RECURSION, SETTLED} <= set(seen)
+
+
+def test_kinds_that_share_their_buffers_each_have_their_own_bits(rng):
+    """One after the other, over the same readings: what one leaves is gone once the next one works."""
+    buffers, kinds = Buffers(), {}
+    for name in ("arw_shakf", "kalman", "steady_state"):
+        lanes = filters(name, 3)
+        kinds[name] = filters(name, 3), lanes, Together(lanes[0], buffers)
+    for given in in_blocks(3, rng, (300, 1, 300)):
+        for alone, lanes, together in kinds.values():
+            expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
+            for a, b in zip(expected, process(together, lanes, given), strict=True):
+                assert_same(a, b)
+
+
+def test_buffers_are_as_large_as_their_pack_and_hold_nothing_of_other_readings():
+    due = np.ones((2, 50), dtype=np.bool_)
+    buffers, names = Buffers(), {"rate": False, "innovation": True}
+    first = buffers.of(due, 0, 2, names)
+    assert {name: array.shape for name, array in first.items()} == {"rate": (2, 50), "innovation": (2, 2, 50)}
+    first["rate"][:] = 1.0
+    assert np.shares_memory(buffers.of(due, 0, 1, names)["rate"], first["rate"])
+    assert buffers.of(due, 0, 3, names)["rate"].shape == (3, 50)
+    assert not np.shares_memory(buffers.of(due, 1, 2, names)["rate"], buffers.of(due, 0, 2, names)["rate"])
+    due[1, ::2] = False
+    assert np.isnan(buffers.of(due, 0, 2, names)["rate"]).all()
 
 
 @pytest.mark.parametrize("name", ["kalman", "arw_shakf", "steady_state"])
