@@ -7,20 +7,26 @@ seeds leave 7 % of the last pair. Run:
 python benchmarks/bench_clock_accuracy.py
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 import numpy as np
 from promises import Promise, conclude
 
 from testbed import Scenario, evaluate
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 FILTERS = ("kalman", "arw_shakf", "wideband", "complementary", "blending", "imm", "vb_akf")
 # Rates of the MHD ARS, of the gyro, and of the gyro in a whole ratio [Hz].
 PAIRS = [(20_000, 2003.704, 2000.0), (20_000, 6664.0, 5000.0), (1000, 400.0, 500.0)]
 
 
-def scenario(fast_hz: float, slow_hz: float) -> Scenario:
-    """Return the run of a pair of rates."""
+def scenario(fast_hz: float, slow_hz: float, filters: Sequence[str]) -> Scenario:
+    """Return the run of a pair of rates through filters."""
     return Scenario.from_dict(
         {
             "name": "clocks",
@@ -32,25 +38,27 @@ def scenario(fast_hz: float, slow_hz: float) -> Scenario:
                 "mhd_ars": {"preset": "sx300", "sample_rate": f"{fast_hz} Hz"},
                 "mems_gyro": {"preset": "adis16505_filtered", "sample_rate": f"{slow_hz} Hz"},
             },
-            "fusion": {name: {} for name in FILTERS},
+            "fusion": {name: {} for name in filters},
         }
     )
 
 
-def squares(fast_hz: float, slow_hz: float, seeds: int) -> dict[str, np.ndarray]:
+def squares(fast_hz: float, slow_hz: float, filters: Sequence[str], seeds: int) -> dict[str, np.ndarray]:
     """Return the mean square errors of each filter under each seed [(deg/s)^2]."""
-    runs = evaluate(scenario(fast_hz, slow_hz), range(1, 1 + seeds))
-    return {name: np.array([run.fusion[name].rmse_deg_s for run in runs], float) ** 2 for name in FILTERS}
+    runs = evaluate(scenario(fast_hz, slow_hz, filters), range(1, 1 + seeds))
+    return {name: np.array([run.fusion[name].rmse_deg_s for run in runs], float) ** 2 for name in filters}
 
 
 def main() -> None:
     """Print the ratios."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=24, help="seeds of each clock")
-    seeds, promises = parser.parse_args().seeds, []
+    parser.add_argument("--filters", nargs="+", default=FILTERS, choices=FILTERS, help="some of them")
+    given = parser.parse_args()
+    seeds, filters, promises = given.seeds, given.filters, []
     for fast, odd, whole in PAIRS:
-        found, beside = squares(fast, odd, seeds), squares(fast, whole, seeds)
-        for name in FILTERS:
+        found, beside = (squares(fast, slow, filters, seeds) for slow in (odd, whole))
+        for name in filters:
             both = [found[name], beside[name]]
             ratio = float(np.sqrt(both[0].mean() / both[1].mean()))
             unsure = 0.5 * ratio * np.hypot(*(one.std(ddof=1) / one.mean() / np.sqrt(seeds) for one in both))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_info
 
 import testbed
 from testbed.fusion import FILTERS
@@ -167,6 +168,19 @@ def test_arguments_and_results_pickle(tmp_path):
     found = testbed.evaluate(*arguments)
     assert pickle.loads(pickle.dumps(found)) == found
     assert found[0][0] == found[0][1]
+
+
+def test_sums_take_one_thread_and_leave_the_setting_as_it_was(tmp_path, monkeypatch):
+    """With threads a block's sums give other last digits, and beside a busy core they wait."""
+    before, seen = _threads(), []
+    monkeypatch.setattr("testbed.campaigns.evaluate._play", lambda *_: seen.append(_threads()) or {(0, 1): None})
+    testbed.evaluate(short(tmp_path), [1])
+    assert seen == [[1] * len(before)]
+    assert _threads() == before
+
+
+def _threads():
+    return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
 
 
 def test_nothing_is_written(tmp_path, monkeypatch):

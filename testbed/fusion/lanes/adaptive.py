@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from testbed.fusion.lanes.adaptive_source import adaptive_source
 from testbed.fusion.lanes.module import module_of
 from testbed.fusion.lanes.pack import Buffers, block_of, packs, padded, pattern_of
-from testbed.fusion.lanes.source import LANES, MEMORY, adaptive_source
+from testbed.fusion.lanes.source import LANES, MEMORY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,11 +41,16 @@ class AdaptiveLanes:
     """
 
     def __init__(self, example: SageHusa, buffers: Buffers) -> None:
-        self._model, n = example, len(example._x)
+        n = len(example._x)
         source, self._rows = adaptive_source(pattern_of(example))
         self._run = module_of(source).run
         self._half = np.tril_indices(n)
-        self._states, self._own = slice(0, n), n + len(self._half[0])
+        # Of each element of P the one of the lower half that stands for it.
+        self._whole = np.zeros((n, n), dtype=np.int64)
+        self._whole[self._half] = self._whole.T[self._half] = np.arange(len(self._half[0]))
+        own = n + len(self._half[0])
+        self._states, self._covariance = slice(0, n), slice(n, own)
+        self._memory = [own + len(MEMORY) * i for i in range(len(example._H))]
         self._buffers = buffers
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
@@ -62,7 +68,8 @@ class AdaptiveLanes:
         if not whole:
             return {}
         due = np.isfinite(received[whole[0]][0])
-        alike = [m for m in whole if _alike(filters[m], filters[whole[0]])]
+        counted = _counted(filters[whole[0]])
+        alike = [m for m in whole if not filters[m]._sensors["outside"].any() and _counted(filters[m]) == counted]
         done: dict[int, EstimateBlock] = {}
         for number, pack in enumerate(packs(alike)):
             arrays = self._buffers.of(due, number, len(pack), _FOUND)
@@ -79,49 +86,40 @@ class AdaptiveLanes:
     ) -> dict[int, EstimateBlock]:
         lanes = padded(pack)
         first, W = filters[pack[0]], np.zeros((len(self._rows), LANES))
-        for lane, m in enumerate(lanes):
-            self._gather(filters[m], W[:, lane])
+        sensors = np.stack([filters[m]._sensors for m in lanes], axis=1)
+        W[self._states] = np.stack([filters[m]._x for m in lanes], axis=1)
+        W[self._covariance] = np.stack([filters[m]._P for m in lanes], axis=2)[self._half]
+        for i, row in enumerate(self._memory):
+            W[row : row + len(MEMORY)] = [sensors[i][name] for name in _OWN]
         windows = np.ascontiguousarray(np.stack([filters[m]._windows for m in lanes], axis=2))
         common, seen = first._sensors.copy(), np.isfinite(first._sensors["previous_reading"]).astype(np.int64)
         matrices = (first._F, first._Q, first._H)
-        Z, started = tuple(received[m][0] for m in lanes), first._progress[0] > 0.0
+        Z, started = tuple(received[m][0] for m in lanes), bool(first._progress[0] > 0.0)
         self._run(*matrices, W.ravel(), windows, common, seen, due, started, Z, *arrays.values())
-        quiet = W[self._rows.index("worst")] <= 1.0
+        quiet = W[self._rows.index("beyond")] <= 0.0
+        self._remember(W, common, sensors)
+        P = W[self._covariance][self._whole]
         done = {}
         for lane, m in enumerate(pack):
             if quiet[lane]:
-                self._scatter(filters[m], W[:, lane], windows[:, :, lane], common)
-                filters[m]._progress[0] = max(filters[m]._progress[0], float(due.any()))
+                one = filters[m]
+                one._x[:], one._P[:], one._windows[:] = W[self._states, lane], P[:, :, lane], windows[:, :, lane]
+                one._sensors[:] = sensors[:, lane]
+                one._progress[0] = max(one._progress[0], float(due.any()))
                 rate, std, innovation, variance = (found[lane] for found in arrays.values())
-                done[m] = block_of(filters[m], rate, std, innovation, variance, received[m][1])
+                done[m] = block_of(one, rate, std, innovation, variance, received[m][1])
         return done
 
-    def _gather(self, one: SageHusa, w: FloatArray) -> None:
-        w[self._states], w[self._states.stop : self._own] = one._x, one._P[self._half]
-        for i, record in enumerate(one._sensors):
-            begin = self._own + len(MEMORY) * i
-            w[begin : begin + len(MEMORY)] = [record[name] for name in _OWN]
-
-    def _scatter(self, one: SageHusa, w: FloatArray, windows: FloatArray, common: np.ndarray) -> None:
-        one._x[:] = w[self._states]
-        one._P[self._half] = w[self._states.stop : self._own]
-        one._P.T[self._half] = w[self._states.stop : self._own]
-        one._windows[:] = windows
-        for i, record in enumerate(one._sensors):
-            begin = self._own + len(MEMORY) * i
-            for name, value in zip(_OWN, w[begin : begin + len(MEMORY)], strict=True):
-                record[name] = value
+    def _remember(self, W: FloatArray, common: np.ndarray, sensors: np.ndarray) -> None:
+        """Write what a block left into the records of the sensors, shape (n_sensor, LANES)."""
+        for i, row in enumerate(self._memory):
+            for name, values in zip(_OWN, W[row : row + len(MEMORY)], strict=True):
+                sensors[name][i] = values
             for name in _ALIKE:
-                record[name] = common[i][name]
+                sensors[name][i] = common[i][name]
 
 
-def _alike(one: SageHusa, other: SageHusa) -> bool:
-    """Return whether two filters have had as many readings, none of them outside the gate or missing just before."""
-    a, b = one._sensors, other._sensors
-    begun = [np.isfinite(x[name]) for x in (a, b) for name in ("previous_reading", "previous_innovation")]
-    return (
-        not a["outside"].any()
-        and one._progress[0] == other._progress[0]
-        and all(np.array_equal(a[name], b[name]) for name in _ALIKE)
-        and all(np.array_equal(one, begun[0]) for one in begun)
-    )
+def _counted(one: SageHusa) -> tuple[Any, ...]:
+    """Return what the lanes of a pack count alike."""
+    begun = (np.isfinite(one._sensors[name]).tolist() for name in ("previous_reading", "previous_innovation"))
+    return float(one._progress[0]), *begun, *(one._sensors[name].tolist() for name in _ALIKE)

@@ -43,6 +43,18 @@ def pattern_of(one: ModelFilter | SteadyState) -> Pattern:
     return Pattern(F, H, one.schedule.strides)
 
 
+def codes_of(due: Any) -> list[int]:
+    """Return the sets of sensors that are read at one instant, as numbers in which sensor i has the bit i.
+
+    Parameters
+    ----------
+    due : ndarray of bool, shape (n_sensor, n_time)
+        Which readings there are.
+    """
+    found: list[int] = np.unique((1 << np.arange(len(due))) @ due).tolist()
+    return found
+
+
 class Buffers:
     """Arrays of a block, used again in the next one and by all filters that share them; NaN where nothing was written.
 

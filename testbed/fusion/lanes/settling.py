@@ -83,9 +83,9 @@ class SettlingGains:
         self._progress[SINCE] = since + steps.size - begin
         return True
 
-    def hold(self, one: SteadyState, due: Any) -> bool:
+    def hold(self, one: SteadyState) -> bool:
         """Return whether they are those of another filter too."""
-        return np.array_equal(due, self.due) and all(map(np.array_equal, _past(one), self._past))
+        return all(map(np.array_equal, _past(one), self._past))
 
     def leave(self, one: SteadyState, x: FloatArray) -> None:
         """Leave a filter at the end of the block, in the state `x`."""

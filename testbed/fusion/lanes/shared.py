@@ -8,8 +8,9 @@ import numpy as np
 
 from testbed.fusion.kernels.covariance import LOST_VARIANCE, gains_kernel
 from testbed.fusion.lanes.module import module_of
-from testbed.fusion.lanes.pack import Buffers, block_of, packs, padded, pattern_of
-from testbed.fusion.lanes.source import LANES, shared_source
+from testbed.fusion.lanes.pack import Buffers, block_of, codes_of, packs, padded, pattern_of
+from testbed.fusion.lanes.shared_source import shared_source
+from testbed.fusion.lanes.source import LANES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +43,9 @@ class SharedLanes:
         self, example: Kalman | SteadyState, kind: type[KalmanGains | SettlingGains], buffers: Buffers
     ) -> None:
         self._model, self._kind = example.model, kind
-        source, self._rows = shared_source(pattern_of(example))
+        pattern = pattern_of(example)
+        source, self._rows = shared_source(pattern)
+        self._together = {sum(1 << i for i in together) for together in pattern.together}
         self._run = module_of(source).run
         self._gains_of = gains_kernel(len(example._x), len(self._model.H), self._model.n_slow)
         self._buffers = buffers
@@ -65,7 +68,7 @@ class SharedLanes:
         first = filters[whole[0]]
         due = np.isfinite(received[whole[0]][0])
         gains = self._gains_for(first, due)
-        alike = [m for m in whole if gains.hold(filters[m], due)] if gains.usable else []
+        alike = [m for m in whole if gains.hold(filters[m])] if gains.usable else []
         done: dict[int, EstimateBlock] = {}
         for number, pack in enumerate(packs(alike)):
             arrays = self._buffers.of(due, number, len(pack), _FOUND)
@@ -74,8 +77,9 @@ class SharedLanes:
 
     def _gains_for(self, first: Any, due: Any) -> KalmanGains | SettlingGains:
         """Return the covariance over the block, which other filters may have asked for already."""
-        if self._gains is None or not self._gains.hold(first, due):
+        if self._gains is None or not (np.array_equal(due, self._gains.due) and self._gains.hold(first)):
             self._gains = self._kind(first, due, self._gains_of)
+            self._gains.usable &= self._together.issuperset(codes_of(due))
         return self._gains
 
     def _pack(
@@ -92,7 +96,7 @@ class SharedLanes:
         Z = tuple(received[m][0] for m in lanes)
         of_gains = (gains.gains, gains.variance, gains.due, gains.started)
         self._run(self._model.F, self._model.H, W.ravel(), *of_gains, Z, *arrays.values())
-        quiet = W[self._rows.index("worst")] <= 1.0
+        quiet = W[self._rows.index("beyond")] <= 0.0
         done = {}
         for lane, m in enumerate(pack):
             if quiet[lane]:
@@ -126,14 +130,9 @@ class KalmanGains:
         self.usable = kernel(self._P, *model, due, self.started, *out) <= LOST_VARIANCE
         self.shown = self.variance.T.copy()
 
-    def hold(self, one: Kalman, due: Any) -> bool:
+    def hold(self, one: Kalman) -> bool:
         """Return whether they are those of another filter too, which had no reading outside the gate just before."""
-        return (
-            not one._outside.any()
-            and one._started == self.started
-            and np.array_equal(one._P, self._before)
-            and np.array_equal(due, self.due)
-        )
+        return not one._outside.any() and one._started == self.started and np.array_equal(one._P, self._before)
 
     def leave(self, one: Kalman, x: FloatArray) -> None:
         """Leave a filter at the end of the block, in the state `x`."""

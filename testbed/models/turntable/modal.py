@@ -2,11 +2,13 @@ r"""The plant by its modes: as exact as rounding on inputs that are held over a 
 
 The linear plant x' = A x + B u + g tau falls apart into complex modes, of which one of each conjugate pair is kept,
 
-.. math:: z_i^+ = e^{\lambda_i h} z_i + \varphi_i (b_i u + g_i \tau), \quad
+.. math:: z_i^+ = e^{\lambda_i h} z_i + \varphi_i (b_i u + g_i \tau) + \psi_i g_i \Delta\tau, \quad
     \varphi_i = (e^{\lambda_i h} - 1) / \lambda_i, \quad y = y_0 + \mathrm{Re} \sum_i c_i z_i.
 
-What bends with the angle (cogging) or the rate (windage) of the spindle is its torque less its linear part, held over
-the step at the angle and rate that are expected in its middle.
+What bends with the angle (cogging) or the rate (windage) of the spindle is its torque less its linear part: over the
+step it is taken as straight, through tau at the angle and rate that are expected in its middle, with the rise Delta tau
+since the middle of the step before. The linear part is that of the first angle, so a wide swing makes tau large: held
+flat, it would cost h^2 dtau/dt / 12 J of rate.
 """
 
 from __future__ import annotations
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 _WORST_CONDITION = 1e8
 # The kernel's loops fill whole vector registers: 16 modes cost two thirds of 13.
 _VECTOR = 8
+# Of a series in |a| < 1 with factorials below: the next one is 1e-18.
+_TERMS = 18
 # Modes of the table that are linear but for the spindle's torque.
 MODAL = ("servo", "ideal")
 
@@ -49,8 +53,8 @@ class Modes:
         Factor of a mode over a step [-].
     push : ndarray of complex, shape (n_input, n_mode)
         What held inputs add over a step.
-    twist : ndarray of complex, shape (n_mode,)
-        What a held torque on the spindle adds over a step [1/(N m)].
+    twist, tilt : ndarray of complex, shape (n_mode,)
+        What a held torque on the spindle adds over a step, and one that rises by as much about 0 [1/(N m)].
     shape : ndarray of complex, shape (n_output, n_mode)
         Outputs from modes; the real part counts.
     positions : ndarray of complex, shape (nv, n_mode)
@@ -62,6 +66,7 @@ class Modes:
     step: ComplexArray
     push: ComplexArray
     twist: ComplexArray
+    tilt: ComplexArray
     shape: ComplexArray
     positions: ComplexArray
     start: ComplexArray
@@ -101,10 +106,22 @@ def modes_of(linear: LinearPlant, x0: FloatArray, dt: float) -> Modes:
         step=_padded(1.0 + rising),
         push=_padded((inverse @ linear.B)[kept].T * held),
         twist=_padded((inverse @ linear.g)[kept] * held),
+        tilt=_padded((inverse @ linear.g)[kept] * dt * _rising(pole * dt)),
         shape=_padded(linear.C @ seen),
         positions=_padded(seen[:nv]),
         start=_padded((inverse @ x0)[kept]),
     )
+
+
+def _rising(a: ComplexArray) -> ComplexArray:
+    r"""Return psi / h = int_0^1 e^{a (1 - u)} (u - 1/2) du of a = lambda h, by its series where |a| is small."""
+    small = np.abs(a) < 1.0
+    total, near, far = np.zeros_like(a), np.where(small, a, 0.0), np.where(small, 1.0, a)
+    term = np.full_like(a, 0.5)
+    for k in range(1, _TERMS):
+        term = term * near / (k + 2)
+        total -= 0.5 * k * term
+    return np.where(small, total, (np.expm1(far) - far) / far**2 - 0.5 * np.expm1(far) / far)
 
 
 def _padded(modes: NDArray[Any]) -> ComplexArray:
@@ -183,7 +200,7 @@ class ModalEngine:
         self._inputs, self._rest = list(inputs), data.ctrl[list(inputs)].copy()
         self._coefficients = tuple(
             np.ascontiguousarray(part)
-            for array in (modes.step, modes.push, modes.twist, modes.shape)
+            for array in (modes.step, modes.push, modes.twist, modes.tilt, modes.shape)
             for part in (array.real, array.imag)
         )
         self._z = np.stack([modes.start.real, modes.start.imag])
@@ -191,8 +208,9 @@ class ModalEngine:
         angle = float(data.qpos[model.joint(plant.SPINDLE).qposadr[0]])
         self._cogging = _cogging(parameters, angle)
         self._q0, self._stride, self._dt = data.qpos.copy(), stride, dt
-        # The rate of the step before, for the windage.
-        self._bend = np.array([parameters.spindle_windage, qvel[spindle], dt])
+        # Rate and bent torque of the step before.
+        windage, rate = parameters.spindle_windage, float(qvel[spindle])
+        self._bend = np.array([windage, rate, dt, -windage * rate * abs(rate)])
 
     def advance(self, start: int, control: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Play the next steps.
@@ -246,7 +264,7 @@ def _cogging(parameters: TurntableParameters, angle: float) -> FloatArray:
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _play(  # type: ignore[no-untyped-def] # pragma: no cover
-    lr, li, br, bi, gr, gi, cr, ci, y0, z, cogging, bend, u, rows, first, stride, kept
+    lr, li, br, bi, gr, gi, tr, ti, cr, ci, y0, z, cogging, bend, u, rows, first, stride, kept
 ):
     """Play held inputs; outputs 0 and 1 are angle and rate of the spindle. Inner loops run over the modes."""
     n, h, zr, zi = lr.size, bend[2], z[0], z[1]
@@ -260,15 +278,18 @@ def _play(  # type: ignore[no-untyped-def] # pragma: no cover
                 value += cr[q, i] * zr[i] - ci[q, i] * zi[i]
             rows[k, q] = value
         angle, rate = rows[k, 0] - y0[0], rows[k, 1]
-        middle, speed = angle + 0.5 * h * rate, 1.5 * rate - 0.5 * bend[1]
+        gained = rate - bend[1]
+        middle, speed = angle + h * (0.5 * rate + 0.125 * gained), rate + 0.5 * gained
         bend[1] = rate
         torque = -bend[0] * speed * abs(speed)
         for c in range(len(cogging)):
             torque += cogging[c, 0] * np.sin(cogging[c, 1] * middle + cogging[c, 2])
             torque -= cogging[c, 3] + cogging[c, 4] * middle
+        rise = torque - bend[3]
+        bend[3] = torque
         for i in range(n):
-            a[i] = lr[i] * zr[i] - li[i] * zi[i] + gr[i] * torque
-            b[i] = lr[i] * zi[i] + li[i] * zr[i] + gi[i] * torque
+            a[i] = lr[i] * zr[i] - li[i] * zi[i] + gr[i] * torque + tr[i] * rise
+            b[i] = lr[i] * zi[i] + li[i] * zr[i] + gi[i] * torque + ti[i] * rise
         for j in range(u.shape[1]):
             for i in range(n):
                 a[i] += br[j, i] * u[k, j]
