@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # Columns of the terminal: errors of a filter beside its name, and gain, phase and error over optimum of one line.
 _TABLE_WIDTH, _LINE_WIDTH = 61, 46
+# What a run folder may hold, what is looked at first in front.
+_FILES = ("report.html", "recording.rrd", "run.nc", "metrics.json", "scenario.yaml", "manifest.json")
 
 
 def print_metrics(metrics: RunMetrics, folder: Path) -> None:
@@ -62,10 +64,9 @@ def print_metrics(metrics: RunMetrics, folder: Path) -> None:
     for bound in metrics.expectations:
         verdict = Text("met", "green") if bound.met else Text("MISSED", "red")
         console.print(f"expected {bound.subject} {bound.metric} {bound.bound}: {number(bound.value)}", verdict)
-    console.print(
-        f"wrote {folder}: report.html, recording.rrd, run.nc, metrics.json, scenario.yaml, manifest.json",
-        soft_wrap=True,
-    )
+    # Which of them there are, the outputs say that were asked for.
+    written = [name for name in _FILES if (folder / name).is_file()]
+    console.print(f"wrote {folder}: {', '.join(written)}", soft_wrap=True)
 
 
 def _start_and_gates(metrics: RunMetrics) -> Iterator[str]:

@@ -293,3 +293,12 @@ def test_expanded_gives_an_option_for_each_field_and_hands_on_the_whole():
     assert seen == [("x", Pair("l", 3), Output(json=True), True), ("x", Pair(), Output(), False)]
     assert CliRunner().invoke(small, ["x", "--right-hand", "three"]).exit_code == 2
     assert inspect.signature(command).parameters.keys() == {"name", "more", "left", "right", "json", "quiet"}
+
+
+def test_a_run_names_the_files_that_it_wrote_and_no_other(spoken, tmp_path):
+    status, out, _ = spoken("run", short_file(tmp_path), "--out", tmp_path / "run", "--outputs", "metrics")
+    assert status == 0
+    (line,) = (line for line in out.splitlines() if line.startswith("wrote "))
+    names = line.rpartition(": ")[2].split(", ")
+    assert sorted(names) == sorted(path.name for path in (tmp_path / "run").iterdir())
+    assert "run.nc" not in names
