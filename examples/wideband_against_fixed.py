@@ -31,6 +31,7 @@ from testbed.fusion import FILTERS, estimate
 from testbed.fusion.base import Received
 from testbed.fusion.belief import SensorBelief, load_belief
 from testbed.fusion.lanes.together import Together
+from testbed.models.motion import ramp
 from testbed.models.motions.sine import Sine
 from testbed.parts import resolve
 from testbed.sensors import load_preset
@@ -63,6 +64,8 @@ RATIO, CLAIM = 1.15, (0.7, 1.4)
 TARGETS = {"0.5 Hz": 0.0030, "4 Hz": 0.0030, "10 Hz": 0.0025, "mixed": 0.0035}
 # A record that begins in mid-motion does so within this [s] of the motion; the sensors have run for as long before.
 ANYWHERE, RUN_UP = 10.0, 5.0
+# One that begins on a table at rest takes this long [s] to its full rate.
+RAMP_IN = 0.5
 
 
 def sine(freq: float, amplitude: float = 1.0) -> Motion:
@@ -108,6 +111,8 @@ def record(motions: Sequence[Motion], duration: float, seed: int, start: str) ->
     """
     if start == "rest":
         rate = truth(motions, duration)
+        # As in a scenario: wheel and platform would jump from a rest to their rate.
+        rate *= ramp(np.arange(rate.size) / RATES["mhd_ars"], RAMP_IN)
         return rate, readings(rate, seed)
     begin = float(random_stream(seed, "begin").uniform(0.0, ANYWHERE))
     rate = truth(motions, duration + RUN_UP, begin)

@@ -21,7 +21,7 @@ _AHEAD = 3
 _PATIENCE = 30.0
 LOOPBACK = "127.0.0.1"
 # A worker publishes nothing, imports what plays while it starts, and is neither held up nor given up for the memory
-# that it holds. A profile of it, which Dask keeps for an hour, would grow by up to 100 kB a second.
+# that it holds. A profile of it, which Dask keeps for an hour, would grow all the while.
 _WORKER = {
     "dashboard": False,
     "preload": ["testbed.campaigns.evaluate"],

@@ -6,6 +6,7 @@ A filter is built from (belief, sample rates, parameters) and turns blocks of re
 from __future__ import annotations
 
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -97,9 +98,9 @@ def estimate(
         If no such filter or belief exists.
     ValueError
         If a parameter, a rate, a stamp or the length of a record is wrong, or a filter refuses stamps that are not
-        regular, or rates in such a ratio.
+        regular, or rates in such a ratio; also if one that is not shipped raises anything when it is built.
     RunError
-        If a filter that is not shipped raises anything, or gives what is no estimate.
+        If a filter that is not shipped raises anything later, or gives what is no estimate.
 
     Examples
     --------
@@ -123,7 +124,7 @@ def estimate(
     from testbed.fusion.belief import default_belief, load_belief
     from testbed.fusion.checked import CheckedFilter
     from testbed.fusion.stamps import rates_of, regular, sorted_by_time
-    from testbed.inputs.plugins import load_plugins
+    from testbed.inputs.plugins import load_plugins, running
     from testbed.parts import resolve
 
     kind = "filter"
@@ -136,8 +137,10 @@ def estimate(
     if sample_rate_hz is None:
         msg = "sample_rate_hz: expected the rate of each sensor, or time_ns, the stamps of its readings"
         raise ValueError(msg)
-    inner = cls(believed, sample_rate_hz, model(**parameters))
     label, shipped = (name, name in FILTERS) if isinstance(name, str) else (cls.__qualname__, False)
+    given = model(**parameters)
+    with nullcontext() if shipped else running(f"filter {label}"):
+        inner = cls(believed, sample_rate_hz, given)
     stage = CheckedFilter(label, inner, max(sample_rate_hz.values(), default=1.0), shipped=shipped)
     if time_ns is not None and regular(time_ns, sample_rate_hz):
         shown = time_ns[max(sample_rate_hz, key=lambda sensor: sample_rate_hz[sensor])]

@@ -34,6 +34,8 @@ MOST_CHARACTERS = 4096
 MOST_DIGITS = 64
 _DATE, _TEXT = Tag(suffix="tag:yaml.org,2002:timestamp"), Tag(suffix="tag:yaml.org,2002:str")
 _NUMBER = re.compile(r"[-+.]*\d[\w.+-]*")
+# What moves a terminal's cursor or colours it, turns the direction of what follows, or is half of a character.
+_UNSEEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -206,6 +208,9 @@ def _check_tag(event: Any, line: int) -> None:
 def _check_scalar(event: ScalarEvent, line: int) -> None:
     if len(event.value) > MOST_CHARACTERS:
         msg = f"expected texts of at most {MOST_CHARACTERS} characters, got {len(event.value)}"
+        raise _LimitError(msg, line)
+    if unseen := _UNSEEN.search(event.value):
+        msg = f"expected texts of characters that can be seen, got U+{ord(unseen[0]):04X}"
         raise _LimitError(msg, line)
     if event.implicit[0] and len(event.value) > MOST_DIGITS and _NUMBER.fullmatch(event.value):
         msg = f"expected numbers of at most {MOST_DIGITS} characters, got {len(event.value)}"

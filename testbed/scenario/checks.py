@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydantic import ValidationError
 
+from testbed.document import findings
 from testbed.errors import RunError, ScenarioError
 from testbed.fusion.checked import CheckedFilter
 from testbed.inputs.plugins import PluginError, running
@@ -42,7 +44,7 @@ def cross_check(scenario: Scenario, document: Document) -> None:
     check_pointing(scenario, document)
     _check_expectations(scenario, document)
     _check_plant(scenario, document)
-    _check_foreign_sensors(scenario, document)
+    _check_sensors(scenario, document)
     _check_filters(scenario, document)
     if not document.problems:
         _check_motion(scenario, document)
@@ -139,16 +141,23 @@ def _check_expectations(scenario: Scenario, document: Document) -> None:
             document.find(("expect", bound.subject, bound.metric), f"is no metric (known: {', '.join(known)})")
 
 
-def _check_foreign_sensors(scenario: Scenario, document: Document) -> None:
-    """Try the sensors of plug-ins, whose faults would else show in the middle of a run."""
+def _check_sensors(scenario: Scenario, document: Document) -> None:
+    """Start the sensors: what their values cannot be together would else show when the run begins, and the faults of
+    plug-ins in the middle of it.
+    """
     if document.problems:
         return
     for name, sensor in scenario.sensors.items():
-        if scenario.sensor_types[name] not in SENSORS:
-            try:
+        try:
+            if scenario.sensor_types[name] in SENSORS:
+                sensor.start(scenario.base_rate_hz, scenario.frame.seed, name)
+            else:
                 try_sensor(sensor, scenario.base_rate_hz)
-            except PluginError as error:
-                document.find(("sensors", name), str(error))
+        except ValidationError as error:
+            for place, message in findings(error, type(sensor), {}):
+                document.find(("sensors", name), ": ".join((*map(str, place), message)))
+        except (ValueError, ArithmeticError) as error:
+            document.find(("sensors", name), str(error))
 
 
 def _check_filters(scenario: Scenario, document: Document) -> None:
@@ -216,9 +225,9 @@ def _find_torque(parameters: TurntableParameters, torque: float, document: Docum
         document.find(
             ("turntable", "digital", "encoder_bits"),
             f"one count of the encoder, {1e6 * digital.resolution:.3g} urad, times the gain of the loop, "
-            f"{count / digital.resolution:.3g} N m/rad, is a torque of {count:.3g} N m, in all {torque:.3g} N m of the "
-            f"motor's {limit:g} N m, also at standstill: take more bits, or a lower rate_bandwidth or "
-            "position_bandwidth",
+            f"{count / digital.resolution:.3g} N m/rad, is a torque of {count:.3g} N m, in all "
+            f"{torque:.3g} N m where the motor has {limit:g} N m, also at standstill: take more bits, or a lower "
+            "rate_bandwidth or position_bandwidth",
         )
         return
     document.find(

@@ -11,6 +11,7 @@ import pytest
 
 import testbed
 from testbed.errors import RunError, ScenarioError
+from testbed.fusion import estimate
 from testbed.judging.allan_records import read_run
 from testbed.report import write_report
 
@@ -123,6 +124,16 @@ def test_what_a_plugin_raises_before_the_run_is_a_finding(scene, hole, fault):
         scene(**{hole: fault})
     assert len(str(caught.value)) < 1000
     assert "x" * 81 not in str(caught.value)
+
+
+@pytest.mark.parametrize("fault", RAISES)
+def test_what_a_filter_raises_when_estimate_builds_it_is_named(fault):
+    """SystemExit too, which once ended the program that asked for the estimate."""
+    namespace = {}
+    exec(f"class Mine:\n    def __init__(self, belief, rates, parameters):\n        {fault}\n", namespace)  # noqa: S102 - the plug-in
+    with pytest.raises(ValueError, match=r"^filter Mine: \w+: ") as caught:
+        estimate(namespace["Mine"], {"mhd_ars": np.zeros(20)}, sample_rate_hz={"mhd_ars": 2000.0}, verdict=False)
+    assert len(str(caught.value)) < 200
 
 
 GIVES = {

@@ -66,6 +66,28 @@ def test_read_yaml_gives_plain_values_and_their_lines(tmp_path):
     ]
 
 
+UNSEEN = [*map(chr, (0, 7, 8, 0x1B, 0x7F, 0x9B, 0x202E, 0x2066)), "\\ud800"]
+
+
+@pytest.mark.parametrize("unseen", UNSEEN, ids=[f"{ord(c[0]):x}" for c in UNSEEN])
+@pytest.mark.parametrize("text", ["a: 1\nb: TEXT", "a: 1\nTEXT: 2", "a: 1\nb: [x, {c: TEXT}]"])
+def test_what_would_act_on_a_terminal_is_refused_with_its_line(tmp_path, unseen, text):
+    """A scenario from a stranger is printed; half a character could not even be written."""
+    path = tmp_path / "it.yaml"
+    escaped = unseen if len(unseen) > 1 else f"\\u{ord(unseen):04x}"
+    path.write_text(text.replace("TEXT", f'"x{escaped}[31m"'))
+    found = refusal(path)
+    assert found.line == 2
+    assert "U+" in found.message
+    assert found.message.isprintable()
+
+
+def test_lines_tabs_and_all_scripts_are_text(tmp_path):
+    path = tmp_path / "it.yaml"
+    path.write_text('a: |\n  two\n  lines\nb: "tab\\t"\nc: 角速度 größer عربى é\U0001f600\n', encoding="utf-8")
+    assert read_yaml(path, "it").data["b"] == "tab\t"
+
+
 def pipe(path):
     os.mkfifo(path)
     return path

@@ -53,6 +53,20 @@ TABLE = {
         ("preset: adis16505_filtered", "preset: adis16505_filtered, clock: {offset: 1e12 s}"),
         "at most 3600.0 s",
     ),
+    **{
+        f"temperature {value}": (("duration: 0.5 s", f"duration: 0.5 s\ntemperature: {value}"), "at most 1000.0 K")
+        for value in ("1e30 K", "1e6 K", "1000 degC", "{start: 20 degC, steps: [{ramp: 1e6 K, over: 1 s}]}")
+    },
+    "temperature of a sensor": (("preset: sx300", "preset: sx300, temperature: 1e12 K"), "at most 1000.0 K"),
+    **{
+        f"drift {value}": (("preset: sx300", f"preset: sx300, channel: {{field_drift: {value} 1/K}}"), bound)
+        for value, bound in (("1e30", "at most 1.0"), ("-2", "at least -1.0"))
+    },
+    **{
+        f"step {value}": (("{preset: air_bearing}", f"{{mode: {mode}, step: {value}}}"), bound)
+        for value, bound in (("1e30 s", "at most 0.01 s"), ("50 s", "at most 0.01 s"), ("1e-12 s", "at least 1e-07 s"))
+        for mode in ("ideal", "servo", "fixed")
+    },
     "sojourn": (("  kalman: {}", "  kalman: {type: imm, sojourn: 1e15 s}"), "at most 1000000.0 s"),
     "ratios": (("  kalman: {}", "  kalman: {type: imm, ratios: [1.0e-300, 1]}"), "ratios.0"),
 }
@@ -66,6 +80,28 @@ def test_what_is_beyond_measure_is_refused_in_seconds(tmp_path, name):
         short(tmp_path, edit)
     assert time.process_time() - begin < 5.0
     assert message in str(caught.value)
+
+
+# Values that are each within their bounds and together no instrument.
+NO_INSTRUMENTS = {
+    "knee at the sample rate": ("mhd_ars", "preset: sx300", "preset: sx300, lowest_frequency: 10 kHz"),
+    "a field beyond all": ("mhd_ars", "preset: sx300", "preset: sx300, channel: {field: 1e30 T}"),
+    "a fluid that boils off": (
+        "mhd_ars",
+        "preset: sx300",
+        "preset: sx300, temperature: 900 K, channel: {fluid: FLUID}",
+    ),
+}
+FLUID = "{density: 13534 kg/m^3, viscosity: 1 mPa*s, viscosity_drift: -1 1/K, conductivity: 1e6 S/m}"
+
+
+@pytest.mark.parametrize("name", NO_INSTRUMENTS)
+def test_values_that_are_no_instrument_together_are_a_finding_of_the_sensor(tmp_path, name):
+    sensor, given, edit = NO_INSTRUMENTS[name]
+    with pytest.raises(ScenarioError) as caught:
+        short(tmp_path, (given, edit.replace("FLUID", FLUID)))
+    assert {problem.key for problem in caught.value.problems} == {f"sensors.{sensor}"}
+    assert all(problem.line for problem in caught.value.problems)
 
 
 @pytest.mark.parametrize("bits", [8, 12, 14])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor, sin
+from math import floor, isfinite, sin
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -132,6 +132,9 @@ class DigitalLoop:
         ctrl[:], disturbed = 0.0, bool(np.delete(control, motor, axis=1).any())
         for i, row in enumerate(control):
             angle = spindle.item(self._spindle)
+            if not isfinite(angle):
+                rows[i:] = np.nan
+                break
             if (start + i) % stride == 0:
                 torque = update(angle, reference[i], feed_forward[i])
                 if not abs(torque) < self._limit:

@@ -32,7 +32,8 @@ class AutoQuantity(Quantity):
         return value if value == "auto" else super()._write(value, info)
 
 
-Step = Annotated[float | Literal["auto"], AutoQuantity("s", "50 us", above=0.0)]
+# From 500 steps in one of the base clock to 200 of its in one.
+Step = Annotated[float | Literal["auto"], AutoQuantity("s", "50 us", at_least=1e-7, at_most=1e-2)]
 PositiveTorque = Annotated[float, Quantity("N*m", "6 N*m", above=0.0)]
 Acceleration = Annotated[float, Quantity("m/s^2", "9.80665 m/s^2", at_least=0.0)]
 DampingRatio = Annotated[float, Field(gt=0.0, lt=1.0, allow_inf_nan=False)]

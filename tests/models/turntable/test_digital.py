@@ -248,6 +248,17 @@ def test_plant_that_diverges_is_reported() -> None:
         run(strong, block)
 
 
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_plant_whose_spindle_is_nowhere_is_reported(axis: str) -> None:
+    """A floor that moves by 1e12 m leaves an angle that is no number for the encoder to round."""
+    line = {"axis": axis, "frequency": 10.0, "displacement": 1e12}
+    p = parameters().model_copy(update={"floor": {"lines": [line]}})
+    floor = p.floor.start(0.02, lambda *_: np.random.default_rng(0))
+    table = Turntable(p, SENSORS, floor=floor)
+    with np.errstate(all="ignore"), pytest.raises(RunError, match="the run got this far"):
+        table.process(command(10.0, 0.1 * DEG, 400))
+
+
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_substeps_keep_the_controllers_clock(substeps: int) -> None:
     p = parameters(encoder_bits=40, controller_rate=10e3)
