@@ -83,7 +83,7 @@ def test_given_step_is_taken(step, holds, substeps, tmp_path):
         ("70 us", "expected auto, or 50 us times or divided by a whole number, got 70 us"),
         ("400 us", "expected every mode below 397.9 Hz at a step of 0.0004 s"),
         ("autos", "expected a quantity in s"),
-        ("0 s", "expected more than 0"),
+        ("0 s", "expected at least 1e-07 s"),
     ],
 )
 def test_step_that_cannot_be_is_refused_with_its_line(step, message, tmp_path):
