@@ -12,6 +12,7 @@ from testbed.campaigns.evaluate import by_itself
 from testbed.campaigns.lockstep import Lockstep
 from testbed.chain.forecast import memory_so_far
 from testbed.chain.pipeline import Chain
+from testbed.judging.judge import Judge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,7 +100,8 @@ def _tried(scenario: Scenario, seeds: Sequence[int]) -> tuple[float, float]:
     tried = min(_TRIED, scenario.n_time)
     if by_itself(scenario):
         once, chain = _spent(lambda: Chain(scenario))
-        each, _ = _spent(lambda: chain.tried(tried))
+        judge = Judge(scenario, chain.rates, chain.step)
+        each, _ = _spent(lambda: judge.write(chain.process(tried)))
         return len(seeds) * once, len(seeds) * each / tried
     once, lockstep = _spent(lambda: Lockstep([scenario], seeds))
     shared, _ = _spent(lockstep.foresee)

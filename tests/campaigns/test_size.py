@@ -10,9 +10,10 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from testbed.campaigns.size import Size, size_of, sweep_words
+from testbed.campaigns.size import Size, size_of, sweep_words, warm
 from testbed.campaigns.study import load_study
 from testbed.cli.app import app
+from testbed.fusion.checked import CheckedFilter
 from tests.campaigns.test_study import written
 
 # Sensors that vary cost each case its own search for the optimum, cases of unlike lengths their own simulation.
@@ -63,9 +64,15 @@ def test_time_and_memory_follow_the_number_of_workers(tmp_path):
     assert (one.cases, one.runs) == (2, 4)
 
 
-def test_a_sensor_with_a_clock_of_its_own_is_no_obstacle(tmp_path):
-    study = load_study(written(tmp_path, "vary: {sensors.mems_gyro.clock.error: [0 ppm, 500 ppm]}\nseeds: 1\n"))
+def test_with_a_clock_of_its_own_the_filters_are_tried_too(tmp_path, monkeypatch):
+    """They take most of the time, and what they compile is to stand in the cache of the workers."""
+    played, process = [], CheckedFilter.process
+    monkeypatch.setattr(CheckedFilter, "process", lambda *given: played.append(given) or process(*given))
+    study = load_study(written(tmp_path, "vary: {sensors.mems_gyro.clock.error: [300 ppm, 500 ppm]}\nseeds: 1\n"))
+    warm(study)
+    assert len(played) == 2
     assert size_of(study).cpu_seconds > 0.0
+    assert len(played) == 2 + 6
 
 
 def test_the_words_have_all_of_it():
