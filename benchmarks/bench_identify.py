@@ -129,8 +129,9 @@ def noise_alone(runs: int) -> Iterator[Promise]:
 
 
 def beliefs(runs: int) -> Iterator[Promise]:
-    """Yield what is promised of the beliefs written, of so many records and seeds as the fiftieth and tenth of runs."""
-    for name, (exact, own) in squares(max(runs // 50, 2), max(runs // 10, 4)).items():
+    """Yield what is promised of the beliefs written, of a record for fifty runs and four seeds for a record."""
+    records = max(runs // 50, 2)
+    for name, (exact, own) in squares(records, 4 * records).items():
         ratio, low, high = worse(exact, own)
         each = np.sqrt(own.mean(axis=1) / exact.mean())
         print(f"{name}: {ratio:.3f} ({low:.3f} to {high:.3f}), by record {np.round(each, 3).tolist()}", flush=True)

@@ -15,7 +15,7 @@ from testbed.errors import quoted
 from testbed.judging.judge import Judge
 from testbed.notebook import Run, open_run
 from testbed.runs.folder import RunFolder, failing_as_run_error, write_metrics, write_scenario
-from testbed.runs.outputs import chosen
+from testbed.runs.outputs import chosen, require_place
 from testbed.runs.results import MemoryStore
 from testbed.runs.size import disk_bytes, require_space
 from testbed.scenario.loader import as_scenario
@@ -86,10 +86,8 @@ def run(
         raise ValueError(msg)
     loaded = as_scenario(scenario)
     loaded = loaded if seed is None else loaded.with_seed(seed)
+    require_place(outputs, out)
     if out is None:
-        if outputs is not None:
-            msg = "outputs: expected only beside out, the folder that they go to"
-            raise ValueError(msg)
         return _run_in_memory(loaded, block, progress)
     if live is not None and block is None:
         # Whoever looks on sees one block late.

@@ -30,7 +30,7 @@ from testbed.playback.sinks import Room, replay_sinks
 from testbed.playback.source import OpenedSource, ReplaySource, open_source
 from testbed.runs.folder import RunFolder, check_free, failing_as_run_error, write_metrics, write_scenario
 from testbed.runs.metrics import ReplayMetrics, RunMetrics
-from testbed.runs.outputs import chosen
+from testbed.runs.outputs import chosen, require_place
 from testbed.runs.results import MemoryStore
 from testbed.signals import BLOCK
 
@@ -174,9 +174,7 @@ def replay(
     >>> run.fusion["kalman"].rate.shape, run.metrics.replay.reference
     ((20000,), False)
     """
-    if out is None and outputs is not None:
-        msg = "outputs: expected only beside out, the folder that they go to"
-        raise ValueError(msg)
+    require_place(outputs, out)
     wanted = None if outputs is None else tuple(outputs)
     check_target(out, wanted)
     made = prepare(

@@ -37,6 +37,21 @@ def chosen(outputs: Iterable[str] | None) -> tuple[str, ...]:
     return tuple(name for name in OUTPUTS if name in wanted)
 
 
+def require_place(outputs: Iterable[str] | None, out: str | Path | None) -> None:
+    """Raise ValueError if outputs are asked for without the folder that they go to.
+
+    Parameters
+    ----------
+    outputs : iterable of str, optional
+        Names.
+    out : str or Path, optional
+        The folder.
+    """
+    if out is None and outputs is not None:
+        msg = "outputs: expected only beside out, the folder that they go to"
+        raise ValueError(msg)
+
+
 def writes(folder: Path, output: str) -> bool:
     """Return whether the run in a folder was to write an output, by its manifest; every one if that does not say.
 

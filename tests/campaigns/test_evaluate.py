@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import testbed
 from testbed.fusion import FILTERS
@@ -172,11 +172,16 @@ def test_arguments_and_results_pickle(tmp_path):
 
 def test_sums_take_one_thread_and_leave_the_setting_as_it_was(tmp_path, monkeypatch):
     """With threads a block's sums give other last digits, and beside a busy core they wait."""
-    before, seen = _threads(), []
+    seen = []
     monkeypatch.setattr("testbed.campaigns.evaluate._play", lambda *_: seen.append(_threads()) or {(0, 1): None})
-    testbed.evaluate(short(tmp_path), [1])
+    # Two, since the environment of the tests may have set one.
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = _threads()
+        testbed.evaluate(short(tmp_path), [1])
+        after = _threads()
+    assert set(before) == {2}
     assert seen == [[1] * len(before)]
-    assert _threads() == before
+    assert after == before
 
 
 def _threads():

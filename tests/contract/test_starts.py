@@ -123,14 +123,14 @@ def test_what_knowing_the_rest_is_worth_to_any_linear_filter() -> None:
 @pytest.mark.oracle
 def test_how_wide_an_unknown_start_is_hardly_matters(monkeypatch) -> None:
     """20 and 2 deg/s, or the 289 and 29 of an even spread over the gyro's range: 10 to 14 s later the recursion claims
-    the same within 6 %.
+    the same within 1 %. No noise is drawn.
     """
     designs = [(1, 0.3 * DEG**2), (2, 1.0), (3, 1e5), (3, 1e11)]
     usual = [left_by(*design, "unknown") for design in designs]
     monkeypatch.setattr(start, "_CONSTANT_STD", np.inf)
     wide = [left_by(*design, "unknown") for design in designs]
     print([f"{one / other - 1.0:.1%}" for one, other in zip(wide, usual, strict=True)])
-    assert wide == pytest.approx(usual, rel=0.06)
+    assert wide == pytest.approx(usual, rel=0.01, abs=0.0)
 
 
 @pytest.mark.parametrize("name", ["kalman", "steady_state", "wideband"])
@@ -139,8 +139,8 @@ def test_a_record_may_begin_far_outside_of_what_is_expected(name: str) -> None:
     rate, readings = record(lambda t: mixed(t) + 200.0 * DEG, 14.0, 1)
     error = judged(name, rate, readings, 10.0, 14.0)[0]
     print(f"{name} {error:.4f} deg/s")
-    # One run: its mean square is within 4.7 of its expectation, as above.
-    assert error < np.sqrt(4.7) * 0.0045
+    # One run of an offset: its mean square is within 4.7 of what the method declares, as above.
+    assert error < np.sqrt(4.7) * METHODS[name].start_leaves[1] / DEG
 
 
 def test_the_seconds_of_a_record_are_those_of_its_readings() -> None:

@@ -175,7 +175,7 @@ def test_cogging_bends_with_the_angle():
 
 @pytest.mark.oracle
 def test_a_swing_of_many_teeth_is_right_to_the_reference():
-    """30 deg/s at 0.1 Hz: held flat over a step, the bent torque costs 1e-10 of the rate; RK4 at 3.1 us leaves 2e-13,
+    """30 deg/s at 0.1 Hz: held flat over a step, the bent torque costs 2e-10 of the rate; RK4 at 3.1 us leaves 2e-13,
     which is its change to 1.6 us.
     """
     found = [
