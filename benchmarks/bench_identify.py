@@ -74,7 +74,6 @@ def written(seed: int, folder: Path) -> dict[str, object]:
     log = read_log(run / "run.nc", {"channels": {name: {"column": name} for name in ("truth/rate", *outputs)}})
     belief = folder / f"belief_{seed}.yaml"
     belief.write_text(belief_text(identify_sensors(log, "truth/rate", outputs, one_clock=True), "a run"))
-    print(belief.read_text(), flush=True)
     return {
         key: one.model_dump(mode="json", context={"border": True}, exclude_none=True)
         for key, one in load_belief(str(belief)).items()

@@ -60,8 +60,8 @@ def truth(signal):
     return ramped(lambda t: sum((a * DEG * np.sin(2.0 * np.pi * f * t) for f, a in LINES[signal]), np.zeros(t.size)))(t)
 
 
-def blocks(filters, signal, seed, change):
-    """Return the error of each filter [deg/s] over the last half, and what it says of gain and delay at the end."""
+def errors_and_delays(filters, signal, seed, change):
+    """Return the error of each filter [deg/s] over the last half, and what it says of the delay at the end [s]."""
     rate = truth(signal)
     parts = {"mhd_ars": change, "mems_gyro": {}}
     sensors = {name: load_preset(preset).model_copy(update=parts[name]) for name, preset in PRESETS.items()}
@@ -76,7 +76,7 @@ def blocks(filters, signal, seed, change):
 
 def errors(filters, signal, seeds, change):
     """Return the mean error of each filter over the seeds [deg/s]."""
-    return np.mean([[error for error, _ in blocks(filters, signal, seed, change)] for seed in seeds], axis=0)
+    return np.mean([[error for error, _ in errors_and_delays(filters, signal, seed, change)] for seed in seeds], axis=0)
 
 
 def delayed_wheel(alone, calibrating, seeds, name):
@@ -84,7 +84,7 @@ def delayed_wheel(alone, calibrating, seeds, name):
     kind, own = alone
     belief = load_belief("eq39")
     told = kind, {**own, "belief": belief | {"mhd_ars": belief["mhd_ars"].model_copy(update=ERRORS[name])}}
-    rows = [blocks([alone, told, calibrating], WHEEL, seed, ERRORS[name]) for seed in seeds]
+    rows = [errors_and_delays([alone, told, calibrating], WHEEL, seed, ERRORS[name]) for seed in seeds]
     untold, known, left = np.mean([[error for error, _ in row] for row in rows], axis=0)
     delay, std = (1e6 * np.array([row[2][1][key] for row in rows]) for key in ("delay", "delay_std"))
     bar = FACTOR * known + MARGIN

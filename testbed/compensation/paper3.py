@@ -115,7 +115,6 @@ def compensate(
     options: PaperOptions | None = None,
     *,
     seed: int = 0,
-    threads: int | None = None,
     modes: FloatArray | None = None,
     groups: Sequence[range] | None = None,
 ) -> PaperResult:
@@ -131,8 +130,6 @@ def compensate(
         The paper's numbers and our choices.
     seed : int
         Of the decomposition and the search.
-    threads : int, optional
-        Of the decomposition.
     modes : ndarray, shape (n_mode + 1, n_time), optional
         A decomposition made before, residual last [rad/s].
     groups : sequence of range, optional
@@ -153,7 +150,7 @@ def compensate(
     Wang, Cui, Cao, Micromachines 14 (2023) 1712, sections 2 and 3.
     """
     chosen = PaperOptions() if options is None else options
-    rows = decompose(record, chosen, seed, threads) if modes is None else modes
+    rows = decompose(record, chosen, seed) if modes is None else modes
     if rows.ndim != 2 or rows.shape[1] != record.rate.size:
         msg = f"modes: expected shape (n_mode + 1, {record.rate.size}), got {rows.shape}"
         raise ValueError(msg)
@@ -168,28 +165,21 @@ def compensate(
     return PaperResult(filtered + signal - drift, drift, filtered, sizes, factor, ratio, search)
 
 
-def decompose(
-    record: GyroRecord, options: PaperOptions | None = None, seed: int = 0, threads: int | None = None
-) -> FloatArray:
+def decompose(record: GyroRecord, options: PaperOptions, seed: int) -> FloatArray:
     """Return the modes that the pipeline begins with, the residual last [rad/s], shape (n_mode + 1, n_time).
 
     Parameters
     ----------
     record : GyroRecord
         To decompose.
-    options : PaperOptions, optional
+    options : PaperOptions
         Variant, trials and noise.
     seed : int
         Of the added noise.
-    threads : int, optional
-        All processors unless told.
     """
     from testbed.compensation.ceemdan import ceemdan
 
-    chosen = PaperOptions() if options is None else options
-    return ceemdan(
-        record.rate, variant=chosen.variant, trials=chosen.trials, noise=chosen.noise, seed=seed, threads=threads
-    )
+    return ceemdan(record.rate, variant=options.variant, trials=options.trials, noise=options.noise, seed=seed)
 
 
 def corrected(record: GyroRecord) -> FloatArray:
