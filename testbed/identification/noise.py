@@ -150,8 +150,12 @@ def _likeliest(terms: FloatArray, density: FloatArray, freedom: FloatArray) -> F
     from scipy.optimize import nnls
 
     believed, level = median_filter(np.abs(density), _NEIGHBOURS, mode="nearest"), np.zeros(terms.shape[1])
+    # Outputs that repeat each other have densities of zero, which no weight can be made of.
+    least = 1e-12 * float(believed.max())
+    if least == 0.0:
+        return level
     for _ in range(_ROUNDS):
-        weight = np.sqrt(freedom) / believed
+        weight = np.sqrt(freedom) / np.maximum(believed, least)
         rows = terms * weight[:, None]
         size = np.linalg.norm(rows, axis=0)
         before, level = level, nnls(rows / size, weight * density)[0] / size

@@ -142,3 +142,14 @@ def test_a_level_that_would_be_below_zero_is_zero():
     assert (found.inner, found.knee) == (0.0, None)
     # The mean of D / S is one.
     assert found.outer**2 == pytest.approx(density.mean(), rel=1e-6, abs=0.0)
+
+
+@pytest.mark.parametrize("zero", [slice(None), slice(0, 30), slice(30, None)])
+def test_densities_of_zero_are_finite_levels(zero):
+    """Outputs that repeat each other have such."""
+    density = np.full(FREQ.size, 2.0)
+    density[zero] = 0.0
+    fit = fit_noise(NoiseFloor(FREQ, density, np.full(FREQ.size, FREEDOM)), GAIN, slow_before=False)
+    found = fit.density(FREQ, GAIN)
+    assert np.all(np.isfinite(found))
+    assert found.any() == density.any()
