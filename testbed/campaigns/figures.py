@@ -8,7 +8,7 @@ import numpy as np
 
 from testbed.campaigns.maps import map_of
 from testbed.campaigns.rows import RESIDUAL
-from testbed.pages.chart import INK, Panel, Series, chart
+from testbed.pages.chart import INK, ChartLine, Panel, chart
 from testbed.pages.palette import Mark, color_of, series_marks
 
 if TYPE_CHECKING:
@@ -45,10 +45,10 @@ def figures_of(found: Summary, axes: Mapping[str, str]) -> dict[str, Markup]:
     if not numeric:
         return {}
     (key, values), *others = numeric.items()
-    log = logarithmic(values)
+    log = by_ratios(values)
     drawn = {name: chart(panels, words[key], height, log=log) for name, panels, height in panels_of(found, key)}
     if others and any(kind == "filter" for kind, _ in found.points):
-        drawn["map"] = map_of(found, numeric, words, {key: logarithmic(values) for key, values in numeric.items()})
+        drawn["map"] = map_of(found, numeric, words, {key: by_ratios(values) for key, values in numeric.items()})
     return drawn
 
 
@@ -91,7 +91,7 @@ def values_along(found: Summary, key: str) -> np.ndarray:
     return np.array(sorted(values)) if values and all(isinstance(one, float) for one in values) else np.empty(0)
 
 
-def logarithmic(values: np.ndarray) -> bool:
+def by_ratios(values: np.ndarray) -> bool:
     """Return whether an axis is drawn as a logarithmic one: its ends are far apart, and the middle one of its values
     is nearer to that of their ratios.
 
@@ -116,7 +116,7 @@ def _rms(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _series(found: Summary, key: str, ends: Ends, mean: Callable[[Sequence[float]], float]) -> list[Series]:
+def _series(found: Summary, key: str, ends: Ends, mean: Callable[[Sequence[float]], float]) -> list[ChartLine]:
     """Return what each source has over an axis; where another axis varies too, the mean over it."""
     groups = {(kind, name): f"{_ROOMS[kind]}/{name}" for kind, name in found.points}
     marks, series = series_marks(groups.values()), []
@@ -124,13 +124,13 @@ def _series(found: Summary, key: str, ends: Ends, mean: Callable[[Sequence[float
         along = _along(points, key)
         low, middle, high = (np.array([mean([ends(one)[k] for one in group]) for _, group in along]) for k in range(3))
         mark = marks[groups[kind, name]]
-        dash = mark.dash if joined(points, key) else None
+        dash = mark.dash if makes_curve(points, key) else None
         color, x = color_of(groups[kind, name]), np.array([value for value, _ in along])
-        series.append(Series(name, color, dash, mark, _WIDTHS[kind], x, middle, low, high))
+        series.append(ChartLine(name, color, dash, mark, _WIDTHS[kind], x, middle, low, high))
     return series
 
 
-def joined(points: Sequence[Point], key: str) -> bool:
+def makes_curve(points: Sequence[Point], key: str) -> bool:
     """Return whether the points of a source make a curve over an axis: not where a further one was drawn beside it, so
     that each point has its own value of both.
 
@@ -146,14 +146,14 @@ def joined(points: Sequence[Point], key: str) -> bool:
     return not (alone and 1 < len(others) == len(points))
 
 
-def _bounds(found: Summary, key: str) -> list[Series]:
+def _bounds(found: Summary, key: str) -> list[ChartLine]:
     """Return floor and optimum, the same for all filters of a case."""
     points = next((points for (kind, _), points in found.points.items() if kind == "filter"), [])
     along, series = _along(points, key), []
-    x, curve = np.array([value for value, _ in along]), joined(points, key)
+    x, curve = np.array([value for value, _ in along]), makes_curve(points, key)
     for bound, (words, mark) in _BOUNDS.items():
         y = np.array([_rms([getattr(point, bound) for point in group]) for _, group in along])
         if np.isfinite(y).any():
-            look = (mark.dash, None) if curve else (None, mark)
-            series.append(Series(words, INK, *look, 1.4, x, y))
+            dash, shown = (mark.dash, None) if curve else (None, mark)
+            series.append(ChartLine(words, INK, dash, shown, 1.4, x, y))
     return series

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.pages.chart import INK, LEFT, WIDTH, frame, svg, words
+from testbed.pages.chart import INK, LEFT, WIDTH, axes_around, svg, words
 from testbed.pages.palette import mix
-from testbed.pages.scales import Scale, Steps, scale_over
+from testbed.pages.scales import Cells, Scale, scale_over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -37,14 +37,16 @@ def map_of(
     ----------
     found : Summary
         What the rows say.
-    values : mapping of str to ndarray
+    values : mapping of str to ndarray, shape (n_value,)
         What each axis takes, by its key.
     named, log : mapping of str to str, to bool
         What stands beside an axis, and whether it is logarithmic where points are drawn.
     """
     first, second = list(values)[:2]
     panels = {
-        name: errors_of(found.points["filter", name], first, second) for kind, name in found.points if kind == "filter"
+        name: errors_over(found.points["filter", name], first, second)
+        for kind, name in found.points
+        if kind == "filter"
     }
     shades = scale_over(np.array([one for errors in panels.values() for one in errors.values()]), 0.0, 1.0, log=True)
     columns = min(_COLUMNS, len(panels))
@@ -66,7 +68,7 @@ def map_of(
     return svg(rows * each, [*parts, _bar(shades, _TITLE, _TITLE + _HEIGHT)])
 
 
-def errors_of(points: Sequence[Point], first: str, second: str) -> dict[tuple[float, float], float]:
+def errors_over(points: Sequence[Point], first: str, second: str) -> dict[tuple[float, float], float]:
     """Return the RMSE by the values at two axes, over all that has both [deg/s].
 
     Parameters
@@ -89,7 +91,7 @@ def crossed(errors: Errors) -> bool:
     Parameters
     ----------
     errors : mapping
-        As `errors_of` returns them.
+        As `errors_over` returns them.
     """
     cells = len({a for a, _ in errors}) * len({b for _, b in errors})
     return 2 * len(errors) >= cells
@@ -102,14 +104,14 @@ def _cells(
     shades: Scale,
     named: tuple[str, str | None],
 ) -> str:
-    x, y = Steps(values[0], *box[:2]), Steps(values[1], *box[2:])
+    x, y = Cells(values[0], *box[:2]), Cells(values[1], *box[2:])
     column, row = ({value: k for k, value in enumerate(one)} for one in values)
     parts = []
     for (a, b), error in errors.items():
         left, top = x.begin + column[a] * x.width, y.begin + (row[b] + 1) * y.width
         size = f'width="{x.width:.1f}" height="{-y.width:.1f}"'
         parts.append(f'<rect x="{left:.1f}" y="{top:.1f}" {size} fill="{color_at(shades, error)}"/>')
-    return f'<g shape-rendering="crispEdges">{"".join(parts)}</g>\n{frame(x, y, *named)}'
+    return f'<g shape-rendering="crispEdges">{"".join(parts)}</g>\n{axes_around(x, y, *named)}'
 
 
 def _points(
@@ -126,7 +128,7 @@ def _points(
         f'<circle cx="{a:.1f}" cy="{b:.1f}" r="4" fill="{color_at(shades, error)}" stroke="{INK}" stroke-width=".5"/>'
         for a, b, error in zip(across, up, errors.values(), strict=True)
     ]
-    return f"{frame(x, y, *named)}{''.join(dots)}\n"
+    return f"{axes_around(x, y, *named)}{''.join(dots)}\n"
 
 
 def color_at(shades: Scale, error: float) -> str:

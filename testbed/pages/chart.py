@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from testbed.pages.palette import marked_every
-from testbed.pages.scales import Scale, Steps, scale_over
+from testbed.pages.scales import Cells, Scale, scale_over
 from testbed.pages.shapes import SHAPES, SOLID_RIM, is_open
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _ROW, _GAP = 14.4, 26.0
 _ENTRY, _LETTER = 45.0, 5.8
 
 
-class Series(NamedTuple):
+class ChartLine(NamedTuple):
     """A line over the axis of its panel, with the ends of its intervals where it has some, NaN where there is nothing.
 
     Without `dash` the points stand alone, and so do their intervals.
@@ -50,7 +50,7 @@ class Panel(NamedTuple):
     """Series over one axis, and what stands beside the upright one."""
 
     upright: str
-    series: Sequence[Series]
+    series: Sequence[ChartLine]
     log: bool
 
 
@@ -75,7 +75,10 @@ def chart(panels: Sequence[Panel], across: str, height: float, *, log: bool) -> 
     for k, panel in enumerate(panels):
         upper = top + k * (each + _GAP)
         y = scale_over(_all(_shown(panel)), upper + each, upper, log=panel.log)
-        parts += [frame(x, y, across if k == len(panels) - 1 else "", panel.upright), *(_drawn(x, y, panel.series))]
+        parts += [
+            axes_around(x, y, across if k == len(panels) - 1 else "", panel.upright),
+            *(_drawn(x, y, panel.series)),
+        ]
     return svg(height, parts)
 
 
@@ -111,12 +114,12 @@ def words(x: float, y: float, text: str, anchor: str = "middle", more: str = "")
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{more}>{escape(text)}</text>\n'
 
 
-def frame(x: Scale | Steps, y: Scale | Steps, across: str, upright: str | None) -> str:
+def axes_around(x: Scale | Cells, y: Scale | Cells, across: str, upright: str | None) -> str:
     """Return both axes with marks, texts and, but for cells, a grid.
 
     Parameters
     ----------
-    x, y : Scale or Steps
+    x, y : Scale or Cells
         The axes; the upright one begins below.
     across : str
         What stands below.
@@ -141,13 +144,13 @@ def frame(x: Scale | Steps, y: Scale | Steps, across: str, upright: str | None) 
         texts += [words(at, middle, upright, more=f' transform="rotate(-90 {at:.1f} {middle:.1f})"')]
     lines = (
         ""
-        if isinstance(x, Steps)
+        if isinstance(x, Cells)
         else f'<path d="{grid}" stroke="{INK}" stroke-opacity=".13" stroke-width=".6" fill="none"/>\n'
     )
     return f'{lines}<path d="{edge}" stroke="{INK}" stroke-width=".7" fill="none"/>\n{"".join(texts)}'
 
 
-def _placed(scale: Scale | Steps) -> list[tuple[float, str]]:
+def _placed(scale: Scale | Cells) -> list[tuple[float, str]]:
     marks = scale.marks()
     places = scale.place(np.array([value for value, _ in marks]))
     return [(float(at), text) for at, (_, text) in zip(places, marks, strict=True)]
@@ -161,7 +164,7 @@ def _shown(panel: Panel) -> list[FloatArray]:
     return [ends for one in panel.series for ends in (one.y, one.low, one.high) if ends is not None]
 
 
-def _drawn(x: Scale, y: Scale, series: Sequence[Series]) -> list[str]:
+def _drawn(x: Scale, y: Scale, series: Sequence[ChartLine]) -> list[str]:
     """Return areas, then lines, then marks, so that no line is hidden by an area."""
     placed = [(one, x.place(one.x), y.place(one.y)) for one in series]
     areas = [_interval(one, at, y) for one, at, _ in placed if one.low is not None and one.high is not None]
@@ -179,14 +182,14 @@ def _path(at: FloatArray, up: FloatArray) -> str:
     return "".join(path)
 
 
-def _line(one: Series, path: str) -> str:
+def _line(one: ChartLine, path: str) -> str:
     assert one.dash is not None
     dash = one.dash[1]
     dashes = f' stroke-dasharray="{" ".join(f"{part * one.width:.2g}" for part in dash)}"' if dash else ""
     return f'<path d="{path}" fill="none" stroke="{one.color}" stroke-width="{one.width:g}"{dashes}/>\n'
 
 
-def _interval(one: Series, at: FloatArray, y: Scale) -> str:
+def _interval(one: ChartLine, at: FloatArray, y: Scale) -> str:
     """Return the area between the ends where the points are joined, else a bar at each."""
     assert one.low is not None
     assert one.high is not None
@@ -202,7 +205,7 @@ def _interval(one: Series, at: FloatArray, y: Scale) -> str:
     return f'<path d="{there}L{back[1:]}z" fill="{one.color}" fill-opacity=".18"/>\n'
 
 
-def _points(one: Series, at: FloatArray, up: FloatArray) -> str:
+def _points(one: ChartLine, at: FloatArray, up: FloatArray) -> str:
     """Return the marks of a series: of many points that are joined a few, each series elsewhere."""
     if one.mark is None:
         return ""
@@ -211,7 +214,7 @@ def _points(one: Series, at: FloatArray, up: FloatArray) -> str:
     return _marks(one, chosen)
 
 
-def _marks(one: Series, places: Iterable[tuple[float, float]]) -> str:
+def _marks(one: ChartLine, places: Iterable[tuple[float, float]]) -> str:
     if one.mark is None:
         return ""
     shape = SHAPES[one.mark.marker]
@@ -222,7 +225,7 @@ def _marks(one: Series, places: Iterable[tuple[float, float]]) -> str:
     return f'<path d="{path}" {ink}/>\n'
 
 
-def _legend(series: Sequence[Series]) -> tuple[str, float]:
+def _legend(series: Sequence[ChartLine]) -> tuple[str, float]:
     """Return the legend, row by row in columns as wide as the longest name, and where the panels below it begin."""
     entry = _ENTRY + _LETTER * max(len(one.name) for one in series)
     n_rows = -(-len(series) // max(1, int(WIDTH / entry)))

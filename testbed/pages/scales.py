@@ -76,7 +76,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Steps:
+class Cells:
     """An axis of cells side by side, each with a value: the first one from `begin` on, the last one up to `end`."""
 
     values: FloatArray

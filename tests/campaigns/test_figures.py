@@ -10,8 +10,8 @@ import pytest
 
 from testbed.campaigns.axes import as_written
 from testbed.campaigns.curves import Point, Summary
-from testbed.campaigns.figures import figures_of, joined, logarithmic, panels_of
-from testbed.campaigns.maps import color_at, crossed, errors_of
+from testbed.campaigns.figures import by_ratios, figures_of, makes_curve, panels_of
+from testbed.campaigns.maps import color_at, crossed, errors_over
 from testbed.campaigns.page import in_units_of
 from testbed.campaigns.study import load_study
 from testbed.pages.palette import luminance
@@ -45,18 +45,18 @@ def test_axes_that_meet_are_cells_and_those_that_were_drawn_are_points():
     assert cells.count("<rect") - shades == 2 * len(GRID)
     assert cells.count("<circle") == 0
     assert points.count("<circle") == 2 * len(DRAWN)
-    assert crossed(errors_of(GRID[:3], "f", "d"))  # as far as it has come
+    assert crossed(errors_over(GRID[:3], "f", "d"))  # as far as it has come
 
 
 def test_points_that_were_drawn_together_are_not_joined_and_their_axes_are_even():
-    assert joined(GRID, "f")
-    assert not joined(DRAWN, "f")
+    assert makes_curve(GRID, "f")
+    assert not makes_curve(DRAWN, "f")
     for found, dashed in ((summary(GRID), True), (summary(DRAWN), False)):
         for _, panels, _ in panels_of(found, "f"):
             assert {one.dash is not None for panel in panels for one in panel.series} == {dashed}
-    assert logarithmic(np.array([1.0, 10.0, 100.0]))
-    assert not logarithmic(np.linspace(1.0, 100.0, 7))
-    assert not logarithmic(np.array(sorted(one.axes["f"] for one in DRAWN)))
+    assert by_ratios(np.array([1.0, 10.0, 100.0]))
+    assert not by_ratios(np.linspace(1.0, 100.0, 7))
+    assert not by_ratios(np.array(sorted(one.axes["f"] for one in DRAWN)))
 
 
 def test_where_another_axis_varies_a_curve_has_the_rms_over_it():

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from testbed.pages.chart import Panel, Series, chart
+from testbed.pages.chart import ChartLine, Panel, chart
 from testbed.pages.palette import _MARKERS, Mark
-from testbed.pages.scales import Steps, scale_over
+from testbed.pages.scales import Cells, scale_over
 from testbed.pages.shapes import SHAPES, is_open
 
 FULL, CIRCLE = (0, None), Mark((0, None), "o", 0)
@@ -22,7 +22,7 @@ NUMBER = r"(-?[\d.]+)"
 
 def series(name="one", color="#2f9e58", **changes):
     x = np.array([1.0, 10.0, 100.0])
-    return Series(name, color, FULL, CIRCLE, 1.9, x, np.array([1.0, 10.0, 10.0]))._replace(**changes)
+    return ChartLine(name, color, FULL, CIRCLE, 1.9, x, np.array([1.0, 10.0, 10.0]))._replace(**changes)
 
 
 def elements(figure, tag):
@@ -122,10 +122,10 @@ def test_marks_are_the_round_values_that_people_expect():
 
 
 def test_cells_stand_side_by_side():
-    steps = Steps(np.array([0.5, 1.0, 2.0, 40.0]), 10.0, 90.0)
+    steps = Cells(np.array([0.5, 1.0, 2.0, 40.0]), 10.0, 90.0)
     np.testing.assert_allclose(steps.place(np.arange(4)), [20.0, 40.0, 60.0, 80.0])
     assert [text for _, text in steps.marks()] == ["0.5", "1", "2", "40"]
-    assert len(Steps(np.arange(100.0), 0.0, 1.0).marks()) == 5
+    assert len(Cells(np.arange(100.0), 0.0, 1.0).marks()) == 5
 
 
 def test_every_mark_has_a_shape_of_its_own_and_is_as_large_as_the_others():
