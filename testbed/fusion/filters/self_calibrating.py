@@ -141,8 +141,7 @@ class SelfCalibrating(BlockFilter):
     Parameters: ClassVar[type[Part]] = SelfCalibratingParameters
     needs_both = True
     caution = "what both sensors share, a gain or a delay, cannot be seen"
-    # Inside a constant rate the first seconds are part of what gain and delay are learned from.
-    start_leaves = (0.0045 * DEG, 0.05 * DEG)
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
         self,
