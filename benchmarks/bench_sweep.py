@@ -1,8 +1,9 @@
 """The scale of a sweep: what a case costs beside its simulation, how cost grows, what a second worker is worth.
 
 - Overhead: CPU seconds of a sweep whose cases are not played (their rows are ready made), from 10 cases to --cases:
-  agenda, rows, store, page. What a further case takes is promised; the page with its figures takes something once. What
-  checking a case takes before the first one runs is printed beside it.
+  agenda, rows, store, page with its figures, the best of some sweeps where they are short. What a case takes is
+  promised for every number of cases, and what a further one takes. What checking a case takes before the first one runs
+  is printed beside it.
 - Length: CPU seconds of `testbed.evaluate` from 1 s to --seconds; what a further simulated second costs stays the same.
 - Workers: wall clock of a sweep of --worker-cases with one worker over that with two, both as clusters that start anew
   (on a machine with two free cores), and the peak resident set of a worker after half of the cases and after all.
@@ -76,8 +77,9 @@ def overhead_ms(folder: Path, study: Study, cases: int) -> float:
         return [{**row, **own} for row in ready]
 
     real, engine.play = engine.play, instant
+    places = [folder / f"instant_{cases}_{k}" for k in range(max(1, 100 // cases))]
     try:
-        return 1e3 * cpu(lambda: sweep(many, out=folder / f"instant_{cases}"))
+        return 1e3 * min(cpu(lambda out=out: sweep(many, out=out)) for out in places)
     finally:
         engine.play = real
 
@@ -120,15 +122,17 @@ def main() -> None:
         folder = Path(place)
         check = cpu(lambda: study_of(folder, 20)) / 20
         study = study_of(folder, 2)
-        overhead_ms(folder, study, 1)
+        overhead_ms(folder, study, 100)
         counts = [n for n in (10, 100, 1000, 10_000) if n <= given.cases]
         costs = {n: overhead_ms(folder, study, n) for n in counts}
         each = [(costs[b] - costs[a]) / (b - a) for a, b in pairwise(counts)]
         for n, cost in costs.items():
             print(f"{n:6d} cases: {cost:.0f} ms beside their simulation, {cost / n:.2f} ms a case")
-        print(f"of which once, for the page: {costs[counts[0]] - counts[0] * each[0]:.0f} ms")
+        print(f"of which once: {costs[counts[0]] - counts[0] * each[0]:.0f} ms")
         print(f"checking a case before the first one runs: {1e3 * check:.0f} ms")
-        promises.append(Promise(f"overhead of a further case, {counts[0]} to {counts[-1]} [ms]", 5.0, max(each)))
+        span = f"{counts[0]} to {counts[-1]} cases"
+        promises.append(Promise(f"overhead a case, {span} [ms]", 5.0, max(costs[n] / n for n in counts)))
+        promises.append(Promise(f"overhead of a further case, {span} [ms]", 5.0, max(each)))
         scenario = study.cases[0].scenario
         testbed.evaluate(scenario, [1])
         lengths = [s for s in (1.0, 10.0, 60.0, 600.0, 3600.0) if s <= given.seconds]

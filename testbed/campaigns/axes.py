@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from testbed.errors import quoted
 from testbed.parts import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Ends = Annotated[tuple[str | int | float, str | int | float], Field()]
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
@@ -115,6 +118,22 @@ def jointly_drawn(axes: dict[str, Axis], seed: int) -> list[dict[str, Any]]:
         raise ValueError(msg)
     columns = {key: _drawn(key, axis, n, seed) for key, axis in axes.items()}
     return [{key: column[k] for key, column in columns.items()} for k in range(n)]
+
+
+def as_written(values: Sequence[Any]) -> tuple[list[float], str] | None:
+    """Return the numbers of an axis with their unit, None unless all are numbers in one unit.
+
+    Parameters
+    ----------
+    values : sequence
+        What the cases of a study have at a key.
+    """
+    found = [_NUMBER.fullmatch(str(value)) for value in values if not isinstance(value, bool)]
+    numbers = [(float(match[1]), match[2].strip()) for match in found if match is not None]
+    units = {unit for _, unit in numbers}
+    if len(numbers) < len(values) or len(units) != 1:
+        return None
+    return [number for number, _ in numbers], units.pop()
 
 
 def _drawn(key: str, axis: Axis, n: int, seed: int) -> list[Any]:

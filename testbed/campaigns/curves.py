@@ -114,7 +114,7 @@ def _mean(values: FloatArray) -> float:
 
 def _interval(values: FloatArray) -> tuple[float, float, float]:
     """Return the mean over seeds with its 95 % interval, by Student's t."""
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     finite = values[np.isfinite(values)]
     if not finite.size:
@@ -122,7 +122,7 @@ def _interval(values: FloatArray) -> tuple[float, float, float]:
     mean = float(finite.mean())
     if finite.size < 2:
         return (np.nan, mean, np.nan)
-    half = float(student.ppf(0.975, finite.size - 1) * finite.std(ddof=1) / finite.size**0.5)
+    half = float(stdtrit(finite.size - 1, 0.975) * finite.std(ddof=1) / finite.size**0.5)
     return (mean - half, mean, mean + half)
 
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 # Base samples that are played to see how long they take, after as many that compile.
 _TRIED = 4000
-# On the disk [byte]: a row; a point of the page, with its place in the figures; the page without any; a case.
-_ROW, _POINT, _PAGE, _CASE = 60, 600, 150_000, 300
+# On the disk [byte]: a row; a point of the page, with its place in the figures; page and parts without any; a case.
+_ROW, _POINT, _PAGE, _CASE = 60, 600, 45_000, 300
 # Of each process of a cluster beside those that play: the scheduler, and who watches over a worker [byte].
 _WATCHER = 60_000_000
 # From the start of a cluster until its workers play [s].

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from testbed.pages.numbers import plain
+from testbed.pages.palette import marked_every
 from testbed.pages.svg import INK
 
 if TYPE_CHECKING:
@@ -25,10 +26,6 @@ DEGREE = float(np.degrees(1.0))
 HOURS_FROM = 7200.0
 # Hours between two marks, the first that leaves at most twelve of them.
 HOUR_STEPS = (0.5, 1.0, 2.0, 3.0, 6.0, 12.0, 24.0)
-
-
-# Marks on a line.
-_N_MARKS = 7
 
 
 def draw(
@@ -74,8 +71,7 @@ def marked(mark: Mark, color: str, n_points: int | None = None) -> dict[str, Any
         "markerfacecolor": color,
     }
     if n_points is not None:
-        step = max(1, n_points // _N_MARKS)
-        style["markevery"] = (int((0.3 + 0.37 * mark.turn) % 1.0 * step), step)
+        style["markevery"] = marked_every(mark, n_points)
     return style
 
 

@@ -56,6 +56,8 @@ DASHES: tuple[Dash, ...] = (
 )
 _OPEN, SOLID = ("x", "+", "1", "2"), ("o", "s", "^", "D", "v", "P", "*", "<", "X", ">", "p", "h")
 _MARKERS = {"sensors": _OPEN, "fusion": SOLID, "columns": SOLID}
+# Marks on a line.
+_N_MARKS = 7
 # Relative luminance that stands out 3:1 on white and on the viewer's dark background.
 _LUMINANCE = 0.2
 
@@ -119,6 +121,20 @@ class Mark(NamedTuple):
     dash: Dash
     marker: str
     turn: int
+
+
+def marked_every(mark: Mark, n_points: int) -> tuple[int, int]:
+    """Return the first point of a line that is marked and how many further the next one is: a few, each line elsewhere.
+
+    Parameters
+    ----------
+    mark : Mark
+        Of the line.
+    n_points : int
+        Of the line.
+    """
+    step = max(1, n_points // _N_MARKS)
+    return int((0.3 + 0.37 * mark.turn) % 1.0 * step), step
 
 
 def series_marks(groups: Iterable[str]) -> dict[str, Mark]:

@@ -9,7 +9,6 @@ from jinja2 import BytecodeCache, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from testbed.pages.numbers import bounded, fixed, plain, significant
-from testbed.pages.svg import svg_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,14 +34,14 @@ class _Compiled(BytecodeCache):
 _COMPILED = _Compiled()
 
 
-def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
+def render(template: str, figures: Mapping[str, Figure | Markup], **values: Any) -> str:
     """Return a page; every name that reaches it is escaped, an unknown one is an error.
 
     Parameters
     ----------
     template : str
         File in `testbed/pages/templates`.
-    figures : mapping of str to Figure
+    figures : mapping of str to Figure or Markup
         Reach the template as `figures`, SVG by name, in the order in which it shows them: `figure_number` counts them.
     **values : Any
         What else the template shows or calls.
@@ -60,8 +59,17 @@ def render(template: str, figures: Mapping[str, Figure], **values: Any) -> str:
     # Globals, so that the macros of a template see them too.
     environment.globals |= {**values, "figure_number": {name: number for number, name in enumerate(figures, 1)}}
     # Markup: text in a figure is drawn as outlines, so no name reaches the page unescaped.
-    drawn = {name: Markup(svg_text(figure, name)) for name, figure in figures.items()}
+    drawn = {
+        name: figure if isinstance(figure, Markup) else Markup(_svg_text(figure, name))
+        for name, figure in figures.items()
+    }
     return environment.get_template(template).render(figures=drawn)
+
+
+def _svg_text(figure: Figure, name: str) -> str:
+    from testbed.pages.svg import svg_text  # matplotlib, which not every page needs
+
+    return svg_text(figure, name)
 
 
 def _vendored(name: str) -> Markup:

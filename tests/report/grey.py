@@ -55,6 +55,20 @@ def confused(figure):
     return found
 
 
+def confused_series(series):
+    """Return what cannot be told apart of the series of a panel that is drawn without a library."""
+    return [
+        (one.name, other.name)
+        for one, other in itertools.combinations(series, 2)
+        if (one.dash, one.mark and one.mark.marker) == (other.dash, other.mark and other.mark.marker)
+        and abs(grey(_ink(one)) - grey(_ink(other))) < APART
+    ]
+
+
+def _ink(one):
+    return "#000000" if one.color == "currentColor" else one.color
+
+
 def _handles(legend):
     return legend.legend_handles
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 import testbed
 from testbed.campaigns.curves import Point, Summary
-from testbed.campaigns.figures import figures_of
+from testbed.campaigns.figures import figures_of, panels_of
 from testbed.campaigns.rows import RESIDUAL
 from testbed.pages.palette import NAMED, series_marks
 from testbed.pages.svg import figure_bytes
@@ -21,7 +21,7 @@ from testbed.report.comparison import Side, _figures
 from testbed.report.digest import ThermalTrace, digest_run
 from testbed.report.figures import thermal_figure
 from testbed.runs.results import RunRecord
-from tests.report.grey import confused, grey
+from tests.report.grey import confused, confused_series, grey
 from tests.report.test_browser import RUN
 from tests.report.test_figures import colors_of, envelope_of, make_digest
 
@@ -61,10 +61,12 @@ def test_the_curves_of_a_campaign():
 
     points = [point(value) for value in (1.0, 3.0, 10.0, 30.0)]
     sources = [("sensor", "mhd_ars"), ("sensor", "mems_gyro"), *(("filter", name) for name in MANY["fusion"])]
-    drawn = figures_of(Summary(dict.fromkeys(sources, points), [], []), {"f": "Hz"})
-    assert {"errors", "response", "sight"} <= set(drawn)
-    assert {figure.axes[-1].get_xlabel() for figure in drawn.values()} == {"f [Hz]"}
-    assert [(name, *pair) for name, figure in drawn.items() for pair in confused(figure)] == []
+    found = Summary(dict.fromkeys(sources, points), [], [])
+    assert list(figures_of(found, {"f": "Hz"})) == ["errors", "sight", "response"]
+    panels = [(name, panel) for name, panels, _ in panels_of(found, "f") for panel in panels]
+    for _, panel in panels:
+        assert {one.name for one in panel.series} >= set(MANY["fusion"])
+    assert [(name, *pair) for name, panel in panels for pair in confused_series(panel.series)] == []
 
 
 def test_sensors_with_thermometers():
