@@ -141,8 +141,7 @@ class SelfCalibrating(BlockFilter):
     Parameters: ClassVar[type[Part]] = SelfCalibratingParameters
     needs_both = True
     caution = "what both sensors share, a gain or a delay, cannot be seen"
-    # Inside a constant rate the first seconds are part of what gain and delay are learned from.
-    start_leaves = (0.0045 * DEG, 0.05 * DEG)
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
         self,
@@ -168,7 +167,8 @@ class SelfCalibrating(BlockFilter):
         slow_hz = self.schedule.sample_rate_hz / self._stride
         one, other = (belief[self.schedule.sensors[i]] for i in (self._noisy, self._clean))
         means = self._stride // strides[self._noisy], self._stride // strides[self._clean]
-        self._calibration = Calibration(one, other, slow_hz, means, parameters.gain_std, parameters.delay_std)
+        priors, at_rest = (parameters.gain_std, parameters.delay_std), parameters.start == "rest"
+        self._calibration = Calibration(one, other, slow_hz, means, *priors, at_rest=at_rest)
         self._known = Calibrated(1.0, 0.0, parameters.gain_std, parameters.delay_std)
         self._gain, self._lags = 1.0, np.full(2, _LEAST_LAG)
         self._second = np.full((2, round(slow_hz) * self._stride), math.nan)
