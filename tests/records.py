@@ -44,7 +44,11 @@ def ramped(motion: Motion) -> Motion:
 
 
 def record(
-    motion: Motion, duration: float, seed: int, changes: Mapping[str, Mapping[str, object]] | None = None
+    motion: Motion,
+    duration: float,
+    seed: int,
+    changes: Mapping[str, Mapping[str, object]] | None = None,
+    presets: Mapping[str, str] = PRESETS,
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Return the true rate [rad/s] at 20 kHz and the readings of both sensors [rad/s], which begin in mid-motion.
 
@@ -58,11 +62,13 @@ def record(
         Of the sensors' noise.
     changes : mapping, optional
         Parameters of a sensor that differ from its preset.
+    presets : mapping of str to str, optional
+        Of each sensor.
     """
     rate = motion(np.arange(round(duration * FS)) / FS)
     given = changes or {}
     sensors = {
-        name: load_preset(preset).model_copy(update=dict(given.get(name, {}))) for name, preset in PRESETS.items()
+        name: load_preset(preset).model_copy(update=dict(given.get(name, {}))) for name, preset in presets.items()
     }
     return rate, {name: sensor.start(FS, seed, name).process(rate) for name, sensor in sensors.items()}
 

@@ -29,6 +29,8 @@ _LONGEST, _FASTEST, _SEGMENT = 0.5, 0.01, 2.0
 _TIE = 0.03
 # What the dynamics remember from before the record, in a pole beside a zero at 0.02 Hz, is below.
 _LOWEST_HZ, _HIGHEST_SHARE = 0.3, 0.4
+# Of a short record, what turns less often in it shows by what its ends leave of it, which is no gain.
+_LEAST_TURNS = 2.0
 _STEPS, _WEIGHINGS = 8, 3
 # Enough of a band for the median of its residual to tell the scale of the noise.
 # Share of the motion below which an octave holds what the ends of the record leave of the others: 1 % of their size.
@@ -103,7 +105,8 @@ class Pair:
         self.grid = Grid(noisy, clean)
         fs = self.grid.sample_rate_hz
         freq = rfftfreq(self.grid.t.size, 1.0 / fs)
-        self._used = (freq >= _LOWEST_HZ) & (freq <= _HIGHEST_SHARE * fs)
+        lowest = max(_LOWEST_HZ, _LEAST_TURNS / self.grid.duration)
+        self._used = (freq >= lowest) & (freq <= _HIGHEST_SHARE * fs)
         self._freq = freq[self._used]
         self._octave = np.floor(np.log2(self._freq)).astype(int)
         self._a_noise = np.abs(clean.belief.response(self._freq)) ** 2 * self.grid.noise(noisy, self._freq)
@@ -136,13 +139,13 @@ class Pair:
             gain = float(found.theta[0])
             step = found.theta[1:] / gain
             offset, rate = offset + float(step[0]), rate + float(step[1])
-            if abs(step[0]) + abs(step[1]) * self.grid.duration < 1e-7:
+            settled = abs(step[0]) + abs(step[1]) * self.grid.duration < 1e-7
+            if settled or not _within(offset, rate):
                 break
         scale = np.diag([1.0, 1.0 / gain, 1.0 / gain])
         covariance = scale @ found.covariance @ scale
         common = found.share < _MOST_NOISE and abs(gain) > _STANDS_OUT * math.sqrt(covariance[0, 0])
-        # Steps that lead far beyond all that was searched follow no motion.
-        common = common and abs(offset) < 2.0 * _LONGEST and abs(rate) < 2.0 * _FASTEST
+        common = common and _within(offset, rate)
         return Agreement(
             gain, offset, rate, middle, covariance, common, found.swing, ambiguity, found.departure, found.departs_at
         )
@@ -159,8 +162,10 @@ class Pair:
             weight = 2.0 / (scale * density)
             normal: FloatArray = np.real((X.conj() * weight) @ X.T)
             noise = self._own_noise(weight, power / self.grid.sample_rate_hz, float(np.sum((w * span) ** 2)) / power)
-            share = float(noise[0, 0] / normal[0, 0])
-            inverse = np.asarray(np.linalg.inv(normal - noise if share < _MOST_NOISE else normal), np.float64)
+            # Where the clean path's slope is noise alone, there is no more than noise to take off.
+            left = normal - noise
+            share = float(noise[0, 0] / normal[0, 0]) if np.linalg.eigvalsh(left)[0] > 0.0 else 1.0
+            inverse = np.asarray(np.linalg.inv(left if share < _MOST_NOISE else normal), np.float64)
             theta: FloatArray = inverse @ np.real((X.conj() * weight) @ y)
             fitted: ComplexArray = theta @ X
             scale = self._scale(y - fitted, density)
@@ -240,7 +245,9 @@ class Pair:
         begins = np.arange(0, a.size - n + 1, max(n // 2, 1))
         window, freq = np.hanning(n + 2)[1:-1], rfftfreq(n, 1.0 / fs)
         weight = 1.0 / np.interp(freq, self._freq, self._a_noise + self._c_noise)
-        weight[(freq < 1.0 / _SEGMENT) | (freq > _HIGHEST_SHARE * fs)] = 0.0
+        weight[freq > _HIGHEST_SHARE * fs] = 0.0
+        # By its number: of a rate that is rounded, the lowest line may lie just below the inverse of the segment.
+        weight[0] = 0.0
         A, C = (np.array([rfft(window * (w * one)[k : k + n]) for k in begins]) for one in (a, self.c))
         lags = min(round(_LONGEST * fs), n // 4)
         # Two windows overlap the less the further they are apart.
@@ -248,6 +255,11 @@ class Pair:
         cross = np.roll(irfft(A * C.conj() * weight, n, axis=1), lags, axis=1)[:, : 2 * lags + 1] / overlap
         norm = float(np.sum(irfft(np.abs(C) ** 2 * weight, n, axis=1)[:, 0]))
         return cross, norm, self.grid.t[begins] + 0.5 * n / fs - middle
+
+
+def _within(offset: float, rate: float) -> bool:
+    """Return whether steps have not led far beyond all that was searched: there they follow no motion."""
+    return abs(offset) < 2.0 * _LONGEST and abs(rate) < 2.0 * _FASTEST
 
 
 def _next_peak(high: NDArray[np.bool_], chosen: int) -> float:

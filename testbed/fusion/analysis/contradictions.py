@@ -15,13 +15,15 @@ if TYPE_CHECKING:
 
     from testbed.fusion.analysis.agreement import Agreement, Pair
     from testbed.fusion.analysis.floor import NoiseRatio
+    from testbed.fusion.belief import SensorBelief
     from testbed.signals import FloatArray
 
 # What a belief's response may be off by, as a standard deviation [-]: of equation (39) and the channel it stands for,
 # 1.9e-3 from 0.1 to 400 Hz. A phase of that much is an offset at a low frequency.
 _MODEL = 2e-3
-# What slow dynamics remember from before the record, as a share of the motion and a standard deviation [-].
-_MEMORY = 5e-3
+# What slow dynamics remember from before the record, as a share of the motion and a standard deviation [-]; poles
+# slower than this remember a constant for longer than the ends are left out [rad/s].
+_MEMORY, _SLOW = 5e-3, 1.0
 # From here on the response of an octave, or the noise between bands, is not what is believed [-].
 _DEPARTURE, _SLOPE = 0.05, 3.0
 # How close a gain, or a noise, is to a factor between units, to be one, and what an odd unit must explain: logarithms.
@@ -295,12 +297,24 @@ def bias_findings(
         return
     w = w / w.sum()
     value = float(w @ (a / gain - pair.c)) / carried * (1.0 if of_noisy else -1.0)
-    motion = _MEMORY * math.sqrt(float(w @ pair.c**2)) / abs(carried)
+    # Whether what is constant was so before the record began is not known.
+    level = _remembered(pair.noisy.belief) * abs(float(w @ pair.c))
+    motion = math.hypot(_MEMORY * math.sqrt(float(w @ pair.c**2)), level) / abs(carried)
     apart = QUANTILE * math.hypot(pair.mean_std(w) / abs(carried), motion, seen.turn_on_bias)
     if abs(value) > factors[names.clean] * max(_LEAST_BIAS, apart):
         name, other = (names.noisy, names.clean) if of_noisy else (names.clean, names.noisy)
         remedy = f"it reads a constant that {other} does not: take it off, or believe a turn_on_bias of that size"
         yield Finding("bias", name, value, value - apart, value + apart, "rad/s", remedy)
+
+
+def _remembered(belief: SensorBelief) -> float:
+    """Return the part of a constant that passes by the slow poles [-]: the sum of r / -p, of simple poles p with the
+    residues r.
+    """
+    b, a = belief.polynomials()
+    poles = np.roots(a)
+    slow = poles[np.abs(poles) < _SLOW]
+    return float(abs(np.sum(np.polyval(b, slow) / (np.polyval(np.polyder(a), slow) * slow))))
 
 
 def undecided_of(pair: Pair, found: Agreement, kinds: Collection[str], names: Names) -> Iterator[str]:

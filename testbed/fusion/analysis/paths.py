@@ -119,7 +119,7 @@ class Grid:
         """Return the readings of a sensor through the dynamics of another one, shape (n_time,) [rad/s].
 
         Means of as many readings as fall on half a step, whose droop is taken out, a cubic spline between them, and the
-        response on the whole record, continued beyond its ends by its reflection in them.
+        response on the whole record, continued beyond its ends in a mirror.
 
         Parameters
         ----------
@@ -138,8 +138,9 @@ class Grid:
         level = float(value.mean())
         value -= level
         p = self._pad
-        ends = 2.0 * value[0] - value[p:0:-1], 2.0 * value[-1] - value[-2 : -p - 2 : -1]
-        spectrum = rfft(np.concatenate([ends[0], value, ends[1]]), self._n)
+        # In a mirror: turned about its end as well, a record that is cut at the crest of a swing would go on with twice
+        # the crest as its mean, which slow dynamics remember for as long as they last.
+        spectrum = rfft(np.concatenate([value[p:0:-1], value, value[-2 : -p - 2 : -1]]), self._n)
         spectrum *= other.response(self._freq) / _droop(self._freq, many, trace.interval)
         passed = level * other.numerator[-1] / other.denominator[-1]
         result: FloatArray = irfft(spectrum, self._n)[p : p + self.t.size] + passed
