@@ -34,10 +34,10 @@ _LEAST = 1e-3
 def shows(metrics: RunMetrics, transfers: Mapping[str, Transfer]) -> bool:
     """Return whether there is anything to draw: a response, a line or a frequency with power."""
     lines = any(line.gain for source in metrics.sources.values() for line in source.lines or [])
-    return metrics.responses is not None or lines or moves(transfers)
+    return metrics.responses is not None or lines or powered(transfers)
 
 
-def moves(transfers: Mapping[str, Transfer]) -> bool:
+def powered(transfers: Mapping[str, Transfer]) -> bool:
     """Return whether the truth has power at any frequency, without which there is no coherence with it."""
     return any(one.freq_hz.size for one in transfers.values())
 
@@ -57,7 +57,7 @@ def bode_figure(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: 
     colors : Mapping
         Group to color.
     """
-    heights = [3, 3, 2] if moves(transfers) else [3, 3]
+    heights = [3, 3, 2] if powered(transfers) else [3, 3]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 0.875 * sum(heights)))
         panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
