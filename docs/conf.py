@@ -79,6 +79,8 @@ sphinx_gallery_conf = {
     "image_scrapers": ("matplotlib",),
     "matplotlib_animations": False,
     "reset_modules": ("matplotlib",),
+    # Two scripts at a time; the worker processes of joblib, which comes with scikit-learn.
+    "parallel": 2,
     "default_thumb_file": None,
 }
 # The gallery's backend draws nothing on a screen, which plt.show says.

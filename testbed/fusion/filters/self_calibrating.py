@@ -250,12 +250,15 @@ class SelfCalibrating(BlockFilter):
         return {name: copy(getattr(self._inner, name)) for name in _INNER[self._name][1]}
 
     def _second_of(self, which: int) -> FloatArray:
-        """Return the readings of a sensor in the second at the slow rate, the mean of those of a fast one [rad/s]."""
-        z, stride = self._second[which], self.schedule.strides[which]
-        due = z[::stride]
-        due = np.where(np.isfinite(due), due, math.nan)
-        many = self._stride // stride
-        means: FloatArray = due.reshape(-1, many).mean(axis=1)
+        """Return the readings of a sensor in the second at the slow rate [rad/s], of a fast one the mean of those that
+        are there, if they are half of them.
+        """
+        stride = self.schedule.strides[which]
+        due = self._second[which, ::stride].reshape(-1, self._stride // stride)
+        good = np.isfinite(due)
+        n = good.sum(axis=1)
+        total = np.where(good, due, 0.0).sum(axis=1)
+        means: FloatArray = np.where(2 * n >= due.shape[1], total / np.maximum(n, 1), math.nan)
         return means
 
     def _built(self, belief: Mapping[str, SensorBelief]) -> ModelFilter:

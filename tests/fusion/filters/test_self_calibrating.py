@@ -113,6 +113,19 @@ def test_a_record_that_begins_in_mid_motion_leaves_gain_and_delay_alone(phase):
     assert found.diagnostics["gain_std"][-1] < 0.003
 
 
+def test_single_readings_that_are_lost_cost_nothing():
+    """One in 200 of either sensor: 5 % of the means of ten readings lack one."""
+    rate, readings = spoilt("gain")
+    rng = np.random.default_rng(6)
+    lossy = {name: np.where(rng.random(z.size) < 0.005, np.nan, z) for name, z in readings.items()}
+    whole, found = built().process(readings), built().process(lossy)
+    for name in ("gain", "delay"):
+        std = whole.diagnostics[f"{name}_std"][-1]
+        assert found.diagnostics[f"{name}_std"][-1] == pytest.approx(std, rel=0.02)
+        assert abs(found.diagnostics[name][-1] - whole.diagnostics[name][-1]) < std
+    assert error(found, rate) < 1.1 * error(whole, rate)
+
+
 def test_at_rest_it_is_the_filter_inside():
     rate, readings = spoilt(motion=still)
     alone = estimate("kalman", readings, sample_rate_hz=RATES, verdict=False, **INNER["kalman"])
