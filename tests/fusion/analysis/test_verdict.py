@@ -169,6 +169,13 @@ def test_what_is_cut_off_at_the_end_of_the_range_is_neither_noise_nor_stuck():
     assert not {("repeats", "mhd_ars"), ("belief", "mhd_ars")} & set(kinds(found))
 
 
+def test_a_sensor_that_always_reads_the_same_is_stuck_and_no_more(moving):
+    """Alone, so that its noise is looked for in what is not stuck."""
+    readings, time_ns = moving
+    found = verdict({"mems_gyro": np.zeros(readings["mems_gyro"].size)}, {"mems_gyro": time_ns["mems_gyro"]}, EQ39)
+    assert kinds(found) == [("repeats", "mems_gyro")]
+
+
 def test_sensors_that_were_swapped_are_told(moving):
     readings, time_ns = moving
     names = {"mhd_ars": "mems_gyro", "mems_gyro": "mhd_ars"}
