@@ -1,10 +1,10 @@
-"""What seeds could share of `wideband`, which goes seed by seed: what of its step belongs to a seed, and how many of its filters share a covariance.
+"""What seeds could share of `wideband`, which goes seed by seed.
 
 Printed: a step with and without states for slow noise; the part of it that no seed can share, which weighs the filters
 by their innovations and mixes them; and of the bank's sixteen filters those whose covariance is the same, bit for bit,
 under eight seeds, over the last two of three seconds. A filter slower than the best one starts again from it, at
 readings that each seed has for itself, and from then on has a covariance of its own. What sharing can give at the most
-follows: the step over what is left of it for each seed. Promised: all filters share at rest, nearly half of them on jitter.
+follows: the step over what is left of it for each seed. Promised: all share at rest, nearly half of them on jitter.
 Run:
 python benchmarks/bench_wideband_lanes.py
 """
