@@ -42,7 +42,7 @@ test: lint
 
 # The site, gallery included, in docs/_build/html; needs no network once it is installed, and a warning is an error.
 docs: .venv/installed-docs
-	$(BIN)/python -m sphinx -q -W --keep-going -b html -d docs/_build/doctrees docs docs/_build/html
+	$(BIN)/python -m sphinx -q -W --keep-going -j 2 -b html -d docs/_build/doctrees docs docs/_build/html
 
 linkcheck: .venv/installed-docs
 	$(BIN)/python -m sphinx -q --keep-going -b linkcheck -D plot_gallery=0 docs docs/_build/linkcheck

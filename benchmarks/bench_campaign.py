@@ -2,9 +2,10 @@
 
 CPU seconds of `testbed.evaluate` on the mixed scenario (20 s, three filters, modal plant) with 2 and with 34 seeds: the
 difference is what a further seed costs, and 1000 seeds are extrapolated from both. Lanes: nanoseconds per lane and
-step, of filters that share one covariance and of filters that have their own, readings and estimates moved to and from
-each lane's arrays included, and CPU seconds that the compiler takes for their generated kernels, in a process whose
-cache folder is empty. Run:
+step, of filters that share one covariance and of filters that have their own: of the recursion alone, readings lane
+beside lane in, estimates, claims and innovations out; and of all that a block costs, gains for 128 seeds, readings and
+estimates moved to and from each lane's arrays included. CPU seconds that the compiler takes for their
+generated kernels, in a process whose cache folder is empty. Run:
 python benchmarks/bench_campaign.py [--seeds 34]
 """
 
@@ -26,7 +27,7 @@ from promises import Promise, conclude
 import testbed
 from testbed.fusion import FILTERS
 from testbed.fusion.belief import default_belief
-from testbed.fusion.lanes.source import LANES
+from testbed.fusion.lanes.source import LANES, PART
 from testbed.fusion.lanes.together import Together
 from testbed.parts import resolve
 
@@ -50,8 +51,8 @@ def seconds(task: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> float:
-    """Return nanoseconds per lane and step, pack after pack of readings that have just been received."""
+def started_lanes(name: str, belief: Mapping[str, Any], **parameters: Any) -> tuple[Any, list[Any], list[Any]]:
+    """Return lanes of a filter, the filters of all packs, and the readings of each."""
     kind = resolve("filter", name, FILTERS)
     first = kind(belief, RATES, kind.Parameters(**parameters))
     filters, rng = [deepcopy(first) for _ in range(PACKS * LANES)], np.random.default_rng(1)
@@ -61,6 +62,14 @@ def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> float:
     ]
     lanes = Together(first)._lanes
     assert lanes is not None
+    return lanes, filters, given
+
+
+def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> tuple[float, float]:
+    """Return nanoseconds per lane and step: of the recursion alone, and of all that a block costs, pack after pack of
+    readings that have just been received.
+    """
+    lanes, filters, given = started_lanes(name, belief, **parameters)
 
     def block() -> list[float]:
         spent = []
@@ -75,7 +84,31 @@ def lane_ns(name: str, belief: Mapping[str, Any], **parameters: Any) -> float:
     block()
     # Each pack at its best, since it is done before others on this machine have their turn.
     best = np.min([block() for _ in range(7)], axis=0)
-    return 1e9 * float(best.sum()) / (N_TIME * len(filters))
+    return recursion_ns(lanes, filters, given), 1e9 * float(best.sum()) / (N_TIME * len(filters))
+
+
+def recursion_ns(lanes: Any, filters: list[Any], given: list[Any]) -> float:
+    """Return nanoseconds per lane and step of what `lanes` compute, readings lane beside lane, as many steps as they
+    take at a time.
+    """
+    received = [one.received(values) for one, values in zip(filters[:LANES], given, strict=False)]
+    asked: list[tuple[Any, ...]] = []
+    run, lanes._run = lanes._run, lambda *arguments: asked.append(arguments)
+    lanes.advance(filters[:LANES], received, range(LANES))
+    # `run` takes what `part` does, but for the readings of each lane and whether there was one before.
+    at = next(i for i, one in enumerate(asked[0]) if isinstance(one, tuple))
+    *common, _, readings = asked[0][: at + 1]
+    z = np.stack(readings, axis=-1)[:, :PART].copy()
+    common = [one[:, :PART] if one.dtype == np.bool_ else one[:PART] if len(one) == N_TIME else one for one in common]
+    found = [np.empty((*one.shape[1:-1], PART, LANES)) for one in asked[0][at + 1 :]]
+    part = sys.modules[run.py_func.__module__].part
+
+    def parts() -> None:
+        for _ in range(N_TIME // PART):
+            part(*common, z, *found)
+
+    parts()
+    return 1e9 * seconds(parts, 15) / (N_TIME // PART * PART * LANES)
 
 
 def compile_s(name: str, **parameters: Any) -> float:
@@ -122,22 +155,22 @@ def main() -> None:
     print(f"2 seeds {few:.3f} CPU s, {most} seeds {many:.3f} CPU s; 1000 seeds are extrapolated")
     shared, own = compile_s("kalman", coloured=False), compile_s("shakf")
     print(f"compiling lanes of five states: {shared:.1f} CPU s with a shared covariance, {own:.1f} with their own")
-    conclude(
+    promises = [
         Promise("a further seed x 3 filters x 20 s, modal plant [CPU s]", 0.06, further),
         Promise("1000 seeds x 3 filters x 20 s, modal plant, extrapolated [CPU s]", 60.0, float(thousand)),
-        Promise(
-            "lane-step with a shared covariance, 5 states [ns]",
-            3.0,
-            lane_ns("kalman", default_belief(), coloured=False),
-        ),
-        Promise("lane-step with a shared covariance, coloured noise [ns]", 18.0, lane_ns("kalman", coloured)),
-        Promise(
-            "lane-step with a shared covariance, steady_state, coloured noise [ns]",
-            22.0,
-            lane_ns("steady_state", coloured, frequency=10.0),
-        ),
-        Promise("lane-step with its own covariance, shakf, 5 states [ns]", 8.0, lane_ns("shakf", default_belief())),
-    )
+    ]
+    for what, alone, whole, name, belief, parameters in (
+        ("shared covariance, 5 states", 3.0, 8.0, "kalman", default_belief(), {"coloured": False}),
+        ("shared covariance, coloured noise", 6.0, 18.0, "kalman", coloured, {}),
+        ("shared covariance, steady_state, coloured noise", 7.0, 22.0, "steady_state", coloured, {"frequency": 10.0}),
+        ("own covariance, shakf, 5 states", 8.0, 18.0, "shakf", default_belief(), {}),
+    ):
+        recursion, block = lane_ns(name, belief, **parameters)
+        promises += [
+            Promise(f"lane-step, {what}: recursion [ns]", alone, recursion),
+            Promise(f"lane-step, {what}: with gains and moving [ns]", whole, block),
+        ]
+    conclude(*promises)
 
 
 if __name__ == "__main__":

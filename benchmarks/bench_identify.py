@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from promises import Promise, conclude
 from scipy.stats import binom
+from scipy.stats import t as student
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -31,26 +32,31 @@ from tests.identification.records import EXCITATIONS, record, rest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from testbed.signals import FloatArray
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 FILTERS = ("kalman", "wideband", "steady_state", "complementary")
 
 
-def inside(name: str, runs: int) -> tuple[int, int]:
-    """Return in how many records the true gain and phase of one frequency, another each time, are in the intervals; one
-    that is given no response, as where the clock was not found, counts for neither.
+def inside(name: str, runs: int) -> FloatArray:
+    """Return in how many records the true gain and the true phase are in their intervals, of each record the share of
+    its frequencies; one that is given no response, as where the clock was not found, counts for none.
     """
-    hits = np.zeros(2, int)
+    share, square = np.zeros(2), []
     for seed in range(runs):
         one = record(EXCITATIONS[name], seed)
         found = measure_response(one.reference, one.output).response
         if not found.freq_hz.size:
             print(f"{name} {seed}: no response", flush=True)
             continue
-        i = seed % found.freq_hz.size
-        true = one.response(found.freq_hz)[i]
-        off = abs(found.gain[i] - abs(true)), abs(np.angle(found.response[i] / true))
-        hits += [error < half[i] for error, half in zip(off, found.half_widths, strict=True)]
-    return int(hits[0]), int(hits[1])
+        true = one.response(found.freq_hz)
+        off = np.stack([found.gain - abs(true), np.angle(found.response / true)]) / found.half_widths
+        share += np.mean(np.abs(off) < 1.0, axis=1)
+        square.append(np.mean((off * student.ppf(0.975, 2.0 * found.freedom)) ** 2, axis=1))
+        law = np.mean(found.freedom / (found.freedom - 1.0))
+    gain, phase = np.mean(square, axis=0)
+    print(f"{name}: mean square of the errors over their variances {gain:.3f}, {phase:.3f}; Student's law {law:.3f}")
+    return share
 
 
 def refused(runs: int) -> int:
@@ -120,7 +126,7 @@ def worse(exact: np.ndarray, own: np.ndarray) -> tuple[float, float, float]:
 def kind_of_motion(name: str, runs: int) -> Iterator[Promise]:
     """Yield what is promised of a kind of motion."""
     low, high = binom.ppf([0.0035, 0.9965], runs, 0.95)
-    for what, hits in zip(("gain", "phase"), inside(name, runs), strict=True):
+    for what, hits in zip(("gain", "phase"), inside(name, runs).tolist(), strict=True):
         yield Promise(f"{name}: {what} inside its 95 % interval, of {runs}", low, hits, at_most=False)
         yield Promise(f"{name}: {what} inside its 95 % interval, of {runs}", high, hits)
     few = max(runs // 20, 2)

@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from promises import Promise, conclude
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -109,13 +110,13 @@ def faults(seeds):
         yield f"wide gyro, {label}", hits, hits, hits
 
 
-def main() -> int:
-    """Print one line for each bar."""
+def main() -> None:
+    """Print one line for each bar, and the promises."""
     seeds = list(range(1, (int(sys.argv[1]) if len(sys.argv) > 1 else 20) + 1))
-    missed, least = 0, math.floor(0.95 * len(seeds))
+    promises, least = [], math.floor(0.95 * len(seeds))
     for name, hits, near, clean in faults(seeds):
-        good = min(hits, near) >= least
-        missed += not good
+        what = f"verdict: {name} named alone and close enough, of {len(seeds)} records"
+        promises.append(Promise(what, least, min(hits, near), at_most=False))
         print(
             f"{name}: named alone {hits}, close enough {near}, nothing left once fixed {clean}, of {len(seeds)}",
             flush=True,
@@ -137,9 +138,9 @@ def main() -> int:
             flush=True,
         )
     print(f"right records with a finding: {false} of {count}")
-    missed += false > max(1, count // 100)
-    return int(missed > 0)
+    promises.append(Promise(f"verdict: right records with a finding, of {count}", max(1, count // 100), false))
+    conclude(*promises)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -52,6 +52,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_title = f"testbed {release}"
 html_show_sourcelink = False
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,
@@ -79,6 +80,8 @@ sphinx_gallery_conf = {
     "image_scrapers": ("matplotlib",),
     "matplotlib_animations": False,
     "reset_modules": ("matplotlib",),
+    # Two scripts at a time; the worker processes of joblib, which comes with scikit-learn.
+    "parallel": 2,
     "default_thumb_file": None,
 }
 # The gallery's backend draws nothing on a screen, which plt.show says.

@@ -56,7 +56,18 @@ def write_pages(folder: Path) -> None:
 def commands() -> str:
     """Return the reference of the commands, by typer's own generator."""
     group = typer.main.get_command(app)
-    return get_docs_for_click(obj=group, ctx=typer.Context(group), name="testbed", title="Commands")
+    text = get_docs_for_click(obj=group, ctx=typer.Context(group), name="testbed", title="Commands")
+    for name, summary in _summaries(group):
+        # The generator ends a summary after 45 letters.
+        whole = f"* `{name}`: {summary}"
+        text = re.sub(rf"^\* `{name}`: .*\.\.\.$", lambda _, whole=whole: whole, text, flags=re.MULTILINE)
+    return text
+
+
+def _summaries(group: Any) -> Iterator[tuple[str, str]]:
+    for name, command in group.commands.items():
+        yield name, inspect.cleandoc(command.help or "").split("\n\n")[0].replace("\n", " ")
+        yield from _summaries(command) if hasattr(command, "commands") else ()
 
 
 def leaderboard() -> str:

@@ -176,12 +176,3 @@ def test_every_module_with_examples_is_run():
 )
 def test_the_glossary_defines(term):
     assert re.search(rf"^(?:[\w ]+, )*{term}(?:, [\w ]+)*\n    \S", testbed.__doc__, re.MULTILINE)
-
-
-@pytest.mark.parametrize(("page", "least"), [("python.md", 15), ("campaigns.md", 6)])
-def test_a_page_for_python_does_what_it_says(page, least, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = Path(testbed.__file__).parents[1] / "docs" / page
-    result = doctest.testfile(str(path), module_relative=False, optionflags=doctest.ELLIPSIS)
-    assert result.attempted > least
-    assert result.failed == 0

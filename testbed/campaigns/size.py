@@ -17,7 +17,7 @@ from testbed.judging.judge import Judge
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from testbed.campaigns.study import Study
+    from testbed.campaigns.study import Study, Variation
     from testbed.scenario.model import Scenario
 
 T = TypeVar("T")
@@ -46,7 +46,8 @@ class Size:
 
 
 def warm(study: Study) -> None:
-    """Play the first moments of the first case, so that what it compiles stands in the cache that workers read.
+    """Play the first moments of the first and the last case, so that what they compile stands in the cache that workers
+    read, and counts for no case.
 
     Parameters
     ----------
@@ -55,7 +56,8 @@ def warm(study: Study) -> None:
     """
     # A case that fails is a row with its reason, which whoever plays it writes.
     with contextlib.suppress(Exception):
-        _tried(study.cases[0].scenario, study.seeds[:1])
+        for case in _ends(study):
+            _tried(case.scenario, study.seeds[:1])
 
 
 def size_of(study: Study, workers: int = 1) -> Size:
@@ -76,7 +78,7 @@ def size_of(study: Study, workers: int = 1) -> Size:
     """
     warm(study)
     cases, seeds = study.cases, study.seeds[:CHUNK]
-    tried = [_tried(case.scenario, seeds) for case in (cases[0], cases[-1])[: len(cases)]]
+    tried = [_tried(case.scenario, seeds) for case in _ends(study)]
     chunks, share = -(-len(study.seeds) // CHUNK), len(study.seeds) / len(seeds)
     # What the first case finds out the others need not, as far as they are like it: the last one tells.
     starts = tried[0][0] + (len(cases) * chunks - 1) * tried[-1][0]
@@ -93,6 +95,11 @@ def size_of(study: Study, workers: int = 1) -> Size:
         memory_bytes=each if alone else (1 + workers) * (each + _WATCHER),
         disk_bytes=_PAGE + _CASE * len(cases) + points * (_POINT + _ROW * len(study.seeds)),
     )
+
+
+def _ends(study: Study) -> Sequence[Variation]:
+    """Return the first and the last case, which differ most, or the only one."""
+    return (study.cases[0], study.cases[-1])[: len(study.cases)]
 
 
 def _tried(scenario: Scenario, seeds: Sequence[int]) -> tuple[float, float]:

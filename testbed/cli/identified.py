@@ -96,6 +96,7 @@ def _plain_sensor(one: Identification) -> dict[str, Any]:
         "denominator": model.denominator.tolist(),
         "delay_us": 1e6 * model.delay,
         "delay_ci95_us": 1.96e6 * model.delay_std,
+        "delay_span_us": [1e6 * end for end in model.delay_span],
         "covariance": model.covariance.tolist(),
         "misfit": model.misfit,
         "freedom": model.freedom,

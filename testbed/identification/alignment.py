@@ -55,8 +55,9 @@ def _fine_structure(series: Series, axis: FloatArray) -> FloatArray:
     return found
 
 
-def rough_lag(X: ComplexArray, Y: ComplexArray, length: float) -> float:
-    """Return how late the output is, where its correlation with the reference has its peak [s].
+def rough_lags(X: ComplexArray, Y: ComplexArray, length: float) -> tuple[float, float]:
+    """Return how late the output is, where its correlation with the reference has its peak [s]: by all frequencies
+    alike, which is sharp, and by the strong ones more, which noise between the lines does not lead astray.
 
     Parameters
     ----------
@@ -66,8 +67,14 @@ def rough_lag(X: ComplexArray, Y: ComplexArray, length: float) -> float:
         Of the record [s].
     """
     levels = [np.sqrt(np.maximum(uniform_filter1d(np.abs(one) ** 2, _LEVEL), 0.0)) for one in (X, Y)]
-    scale = np.where(levels[0] * levels[1] > 0.0, levels[0] * levels[1], 1.0)
-    n = next_fast_len(4 * X.size)
-    found = np.abs(ifft(np.concatenate([[0.0], np.conj(X) * Y / scale]), n))
+    cross = np.conj(X) * Y
+    alike, strong = (_peak(cross, scale) * length for scale in (levels[0] * levels[1], np.sqrt(np.abs(cross))))
+    return alike, strong
+
+
+def _peak(cross: ComplexArray, scale: FloatArray) -> float:
+    """Return where a correlation has its peak, in lengths of the record."""
+    n = next_fast_len(4 * cross.size)
+    found = np.abs(ifft(np.concatenate([[0.0], cross / np.where(scale > 0.0, scale, 1.0)]), n))
     peak = int(np.argmax(found))
-    return float((peak if peak <= n // 2 else peak - n) * length / n)
+    return (peak if peak <= n // 2 else peak - n) / n

@@ -53,7 +53,8 @@ def belief_text(found: Sequence[Identification], source: str) -> str:
 def _comment(one: Identification, key: str) -> str:
     if key == "delay":
         limit = f"the filters know it up to {one.belief.delay_holds_to:.3g} Hz"
-        return f"  # +- {1.96e6 * one.model.delay_std:.2g} us; {limit}"
+        low, high = (1e6 * end for end in one.model.delay_span)
+        return f"  # {low:.4g} to {high:.4g} us; {limit}"
     if key in ("noise_knee", "bias_instability"):
         return "  # 1/f as far as the record shows it"
     return ""

@@ -49,8 +49,8 @@ class LocalFit:
         For how long the reference is at these frequencies, less what looks like a smooth phase [s].
     coherence : float
         Share of the output that follows the reference [-].
-    chance : float
-        Logarithm of the chance of more than that without any connection.
+    ratio, n_term : float, int
+        Mean square that follows the reference over that of the noise, and how many terms of the response were told.
     is_line : bool
         Whether the reference has a line there and little else.
     rest : ndarray of complex, shape (n_freq,)
@@ -69,9 +69,15 @@ class LocalFit:
     pull: float
     spread: float
     coherence: float
-    chance: float
+    ratio: float
+    n_term: int
     is_line: bool
     rest: ComplexArray
+
+    @property
+    def chance(self) -> float:
+        """Logarithm of the chance of a larger ratio without any connection."""
+        return float(fisher.logsf(self.ratio, 2 * self.n_term, 2 * self.freedom))
 
 
 def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexArray, Z: ComplexArray) -> LocalFit:
@@ -113,7 +119,6 @@ def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexA
     noise = unexplained / freedom
     # What the residual of each bin has of the noise there.
     share = 1.0 - np.sum(smooth**2, axis=1) - np.sum(np.abs(U) ** 2, axis=1)
-    ratio = explained / s.size / noise if noise > 0.0 else np.inf
     return LocalFit(
         freq_hz=middle,
         response=complex(first @ onto[0]),
@@ -127,7 +132,8 @@ def fit_local(part: SpectrumPart, freq: FloatArray, X: ComplexArray, Y: ComplexA
         pull=float(np.vdot(left[1], left[0]).real) / noise if noise > 0.0 else 0.0,
         spread=float(np.linalg.norm(left[1]) / (2.0 * np.pi * middle * max(float(np.linalg.norm(Y)), 1e-300))),
         coherence=explained / (explained + unexplained) if explained > 0.0 else 0.0,
-        chance=float(fisher.logsf(ratio, 2 * s.size, 2 * freedom)),
+        ratio=explained / s.size / noise if noise > 0.0 else np.inf,
+        n_term=s.size,
         is_line=part.is_line,
         rest=left[0],
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from testbed.identification.alignment import MOST_APART, rough_clock, rough_lag
+from testbed.identification.alignment import MOST_APART, rough_clock, rough_lags
 from testbed.identification.local import LocalFit, fit_local
 from testbed.identification.spectrum import RecordGrid, Series, spectrum
 from testbed.identification.windows import quiet_parts, spectrum_parts
@@ -68,7 +68,7 @@ class Matched:
     @property
     def misfit(self) -> float:
         """Logarithm of what the fits leave, over their degrees of freedom: least where the clock is right."""
-        return float(sum(one.freedom * np.log(max(one.noise, 1e-300)) for one in self.fits))
+        return _misfit(self.fits)
 
 
 def match(reference: Series, output: Series, *, one_clock: bool = False) -> Matched:
@@ -103,8 +103,9 @@ def _matched(reference: Series, output: Series, clock: OutputClock, *, staged: b
     """Return the channels matched from a clock near enough, or by stages from one that is not."""
     grid = common_grid(reference, [(output, clock.error)])
     X = spectrum(reference, grid)[0]
-    lag = rough_lag(X, spectrum(output, grid, clock.error)[0], grid.length)
-    work = _Work(output, grid, X, spectrum_parts(np.abs(X) ** 2), np.exp(2j * np.pi * grid.freq_hz * lag))
+    lags = rough_lags(X, spectrum(output, grid, clock.error)[0], grid.length)
+    parts = spectrum_parts(np.abs(X) ** 2)
+    work = min((_Work(output, grid, X, parts, lag) for lag in lags), key=lambda one: _misfit(one.fits(clock, parts)))
     if staged:
         edge = _FIRST_STAGE / (MOST_APART * grid.length)
         while edge < grid.freq_hz[-1]:
@@ -115,7 +116,11 @@ def _matched(reference: Series, output: Series, clock: OutputClock, *, staged: b
         before, clock = clock, work.improved(clock, work.parts)
         if not abs(clock.error - before.error) > _SETTLED * clock.std:
             break
-    return Matched(grid, clock, lag, *work.settled(clock))
+    return Matched(grid, clock, work.lag, *work.settled(clock))
+
+
+def _misfit(fits: Sequence[LocalFit]) -> float:
+    return float(sum(one.freedom * np.log(max(one.noise, 1e-300)) for one in fits))
 
 
 @dataclass(frozen=True)
@@ -124,11 +129,16 @@ class _Work:
     grid: RecordGrid
     X: ComplexArray
     parts: list[SpectrumPart]
-    back: ComplexArray
+    lag: float
 
     def transformed(self, clock: OutputClock) -> tuple[ComplexArray, ComplexArray]:
+        back = np.exp(2j * np.pi * self.grid.freq_hz * self.lag)
         Y, Z = spectrum(self.output, self.grid, clock.error)
-        return self.back * Y, self.back * Z
+        return back * Y, back * Z
+
+    def fits(self, clock: OutputClock, parts: Sequence[SpectrumPart]) -> list[LocalFit]:
+        Y, Z = self.transformed(clock)
+        return [fit_local(part, self.grid.freq_hz, self.X, Y, Z) for part in parts]
 
     def settled(self, clock: OutputClock) -> tuple[list[LocalFit], list[LocalFit]]:
         """Return the fits, and those of the parts between them."""
@@ -141,9 +151,7 @@ class _Work:
         """Return the clock after one step."""
         if clock.std == 0.0 or not parts:
             return clock
-        Y, Z = self.transformed(clock)
-        fits = [fit_local(part, self.grid.freq_hz, self.X, Y, Z) for part in parts]
-        told = [one for one in fits if one.spread > _SPREAD * self.grid.length]
+        told = [one for one in self.fits(clock, parts) if one.spread > _SPREAD * self.grid.length]
         curvature = sum(one.curvature for one in told)
         if not curvature > 0.0:
             return OutputClock(clock.error, np.inf)

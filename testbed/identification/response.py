@@ -150,11 +150,13 @@ def measure_response(reference: Series, output: Series, *, one_clock: bool = Fal
     """
     found = match(reference, output, one_clock=one_clock)
     limit = chance_limit(len(found.fits))
-    follows = [one for one in found.fits if one.chance < limit]
+    sure = [one.chance < limit for one in found.fits]
+    follows = [one for one, is_sure in zip(found.fits, sure, strict=True) if is_sure]
+    idle = [one for one, is_sure in zip(found.fits, sure, strict=True) if not is_sure]
     mains = _mains(follows, found.grid)
     used = [one for one in follows if one.freq_hz not in mains]
-    unfollowed = [one.freq_hz for one in found.fits if one.is_line and one.chance >= limit]
-    others = [(one.noise_hz, one.power, one.freedom) for one in found.fits if one.chance >= limit]
+    unfollowed = [one.freq_hz for one in idle if one.is_line]
+    others = [(one.noise_hz, one.power, one.freedom) for one in idle]
     others += [(one.noise_hz, one.noise, one.freedom) for one in found.quiet]
     return Measured(
         _response(used, found),

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from testbed.identification.channels import of_one_clock, series_of
-from testbed.identification.model import SensorModel, fit_model
+from testbed.identification.model import fit_model
 from testbed.identification.noise import Heard, NoiseFit, fit_noise, three_floors
 from testbed.identification.response import Measured, measure_response
 from testbed.identification.words import refusal_of
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from testbed.identification.channels import Prepared
     from testbed.identification.noise import ThreeFloors
     from testbed.identification.response import NoiseFloor
+    from testbed.identification.sensor_model import SensorModel
     from testbed.logs.channel import Log, LogChannel
 
 # Digits of what a belief file holds: the noise of any record leaves fewer.
@@ -236,6 +237,12 @@ def _left_out(model: SensorModel, measured: Measured) -> list[str]:
         said.append(
             f"the output is early by {-1e6 * model.delay:.4g} us: the clocks did not begin together, or the reference "
             "is late; the belief has no delay"
+        )
+    if model.delay_is_open:
+        low, high = (1e6 * one for one in model.delay_span)
+        said.append(
+            f"dead times from {low:.4g} to {high:.4g} us are nearly as likely, each with other poles: this record does "
+            "not decide; one with more frequencies, or higher ones, would"
         )
     if measured.mains:
         said.append(f"left out, since it may be hum in both: {', '.join(f'{freq:.5g} Hz' for freq in measured.mains)}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import CZT
+from scipy.signal import ZoomFFT
 
 if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
@@ -98,8 +98,7 @@ def spectrum(series: Series, grid: RecordGrid, clock: float = 0.0) -> tuple[Comp
     values = series.values[first : first + n_time]
     freq = grid.freq_hz
     turn = np.exp(-2j * np.pi * freq * ((1.0 + clock) * own[0] - grid.start))
-    w = np.exp(-2j * np.pi * step / grid.length)
-    transform = CZT(n_time, grid.n_freq, w, np.conj(w))
+    transform = ZoomFFT(n_time, np.array([1, grid.n_freq + 1]) / grid.length, grid.n_freq, fs=1.0 / step)
     factor = step * turn * (2j * np.pi * freq if series.is_angle else 1.0)
     X: ComplexArray = factor * transform(values)
     return X, -2j * np.pi * freq * factor * transform(own * values)

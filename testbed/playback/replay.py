@@ -202,9 +202,10 @@ def prepare(
     settle: float | None = None,
     lines: Sequence[float] = (),
     plugins: Iterable[str] = (),
+    named: Callable[[str], None] | None = None,
 ) -> Playback:
     """Read a recording and what it is to go through; arguments as `replay`, names of filters and a file of them may
-    both be given.
+    both be given. `named` hears the recording's name before it is read.
     """
     if start not in {None, "unknown", "rest"}:
         raise ScenarioError([Problem(f"expected unknown or rest, got {quoted(start)}", "--start")])
@@ -220,6 +221,8 @@ def prepare(
         raise ScenarioError([Problem(message, f"fusion.{both[0]}")])
     # What is wrong is told before a long recording is read.
     _check_asked(settle, lines, opened)
+    if named is not None:
+        named(opened.name)
     source = opened.read()
     said = {name: 1.0 / abs(one.factor) for name, one in source.sensors.items() if one.kind == "rate"}
     reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, said, fix=fix)
@@ -364,6 +367,14 @@ def _channel(channel: LogChannel, reel: Reel, lineup: Lineup) -> dict[str, Any]:
     }
 
 
+def _of_reference(source: ReplaySource) -> list[str]:
+    """Return what is taken for granted of a reference that has stamps of its own."""
+    if source.reference is None or any(one.table is source.reference.table for one in source.sensors.values()):
+        return []
+    words = "the reference's clock is taken for that of the sensors, and nothing here compares the two"
+    return [f"{words}: testbed identify --input reference tells its rate, and an offset as dead time"]
+
+
 def _facts(source: ReplaySource, reels: Sequence[Reel], reference: Reel | None, lineup: Lineup) -> ReplayMetrics:
     channels = {
         reel.name: {
@@ -386,6 +397,6 @@ def _facts(source: ReplaySource, reels: Sequence[Reel], reference: Reel | None, 
             "channels": channels,
             "reference_channel": known,
             "start_ns": lineup.start_ns,
-            "notes": list(source.notes),
+            "notes": [*source.notes, *_of_reference(source)],
         }
     )

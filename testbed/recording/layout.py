@@ -102,12 +102,14 @@ def blueprint(
         left.append(_tabs([*map(_profile, channels), *(plot(*probe, zoom) for probe in probes)]))
     closer = [
         plot(f"Rate, {span} [{unit}]", [*rates, *marks], zoom),
-        at_cursor(f"Rate ±{_short(around)} at the cursor [{unit}]", [*rates, *marks], (-around, around)),
         plot(f"{estimated} [{unit}]", truth_and_filters, (0.0, duration)),
     ]
     if live:
-        # Who looks on sees what comes in: in front stands what moves with it, and the whole run.
+        # Who looks on sees what comes in: in front stands what moves with it. Around the cursor there is nothing yet.
         closer.insert(0, at_cursor(f"Rate, the last {LATELY:g} s [{unit}]", [*rates, *marks], (-LATELY, 0.0)))
+    else:
+        at = at_cursor(f"Rate ±{_short(around)} at the cursor [{unit}]", [*rates, *marks], (-around, around))
+        closer.insert(1, at)
     right: list[Row] = [
         ("Rates", [plot(f"Rate, whole run [{unit}]", rates, (0.0, duration))], len(rates)),
         ("Rates, closer", closer, len(rates) + len(marks)),

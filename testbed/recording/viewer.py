@@ -14,10 +14,10 @@ import time
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from testbed.errors import RunError, ScenarioError, quoted
+from testbed.errors import RunError, ScenarioError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rerun.experimental import ViewerClient
 
@@ -110,7 +110,7 @@ def screenshot(recording: Path, picture: Path, *, at: float, size: tuple[int, in
         started = time.monotonic()
         show(client, recording, at)
         time.sleep(max(0.0, TOASTS - (time.monotonic() - started)))
-        picture.write_bytes(settled_picture(client))
+        picture.write_bytes(settled_picture(client, client.take_screenshot))
         errors = [f"{v.name}: {r.summary}" for v in client.get_state().views for r in v.reports]
         if errors:
             msg = f"{recording}: the viewer reports {'; '.join(errors)}"
@@ -168,41 +168,32 @@ def show(client: ViewerClient, recording: Path, at: float) -> None:
     client.set_time("sim_time", duration=at, play_state="paused")
 
 
-def settled_picture(client: ViewerClient, view: str | None = None) -> bytes:
-    """Return a PNG of the viewer, or of the view of that name, once three in a row are equal.
+def settled_picture(client: ViewerClient, take: Callable[[], bytes]) -> bytes:
+    """Return a PNG of a viewer once three in a row are equal.
 
     Parameters
     ----------
     client : ViewerClient
         The viewer.
-    view : str, optional
-        Name of the view.
+    take : callable
+        Takes a picture of it, or of one of its views.
 
     Raises
     ------
     RunError
         If the picture is still changing after 45 s.
     """
-    view_id = None if view is None else _view_id(client, view)
     last: Sequence[bytes] = ()
     deadline = time.monotonic() + DRAW_TIMEOUT
     while time.monotonic() < deadline:
         # Before it is painted for the first time a view is unknown to the viewer.
         with contextlib.suppress(ConnectionError):
-            last = [*last[-2:], client.take_screenshot(view_id)]
+            last = [*last[-2:], take()]
         if len(last) == 3 and last[0] == last[1] == last[2] and not client.get_state().loading:
             return last[0]
         time.sleep(0.2)
     msg = f"the viewer was still drawing after {DRAW_TIMEOUT:g} s"
     raise RunError(msg)
-
-
-def _view_id(client: ViewerClient, name: str) -> str:
-    views = {view.name: view.view_id for view in client.get_state().views}
-    if name not in views:
-        msg = f"view: expected one of {', '.join(map(repr, views))}, got {quoted(name)}"
-        raise RunError(msg)
-    return str(views[name])
 
 
 def _recording_of(run_dir: Path) -> Path:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from testbed.pages.palette import series_colors
 from testbed.pages.svg import FORMATS, figure_bytes
 from testbed.pages.template import render
-from testbed.report.bode import bode_figure, shows
+from testbed.report.bode import bode_figure, powered, shows
 from testbed.report.budget import band_rows, budget_figure, line_error, line_optima
 from testbed.report.closer import closer_views
 from testbed.report.digest import N_CLOSE, Digest, digest_run
@@ -120,6 +120,7 @@ def _render(metrics: RunMetrics, scenario: str, digest: Digest) -> str:
         summary=summary(metrics, digest),
         scenario=scenario,
         digest=digest,
+        powered=powered(digest.transfers),
         closer=closer_views(digest, _colors(metrics), (unit, scale)),
         closer_bins=N_CLOSE,
         bands=band_rows(metrics.budget, digest) if metrics.budget else [],

@@ -15,7 +15,7 @@ from testbed.pages.palette import series_marks
 from testbed.pages.svg import INK, STYLE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
@@ -34,11 +34,16 @@ _LEAST = 1e-3
 def shows(metrics: RunMetrics, transfers: Mapping[str, Transfer]) -> bool:
     """Return whether there is anything to draw: a response, a line or a frequency with power."""
     lines = any(line.gain for source in metrics.sources.values() for line in source.lines or [])
-    return metrics.responses is not None or lines or any(one.freq_hz.size for one in transfers.values())
+    return metrics.responses is not None or lines or powered(transfers)
+
+
+def powered(transfers: Mapping[str, Transfer]) -> bool:
+    """Return whether the truth has power at any frequency, without which there is no coherence with it."""
+    return any(one.freq_hz.size for one in transfers.values())
 
 
 def bode_figure(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> Figure:
-    """Draw gain and phase over the truth, and coherence with it.
+    """Draw gain and phase over the truth, and coherence with it where there is power to judge it.
 
     Lines are responses: of a sensor as it is built, dotted as a filter believes where that is another. Points are what
     came out: of the commanded lines by least squares, between them by spectra where the coherence is above chance.
@@ -52,15 +57,17 @@ def bode_figure(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: 
     colors : Mapping
         Group to color.
     """
+    heights = [3, 3, 2] if powered(transfers) else [3, 3]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, 7.0))
-        panels = figure.subplots(3, 1, sharex=True, height_ratios=[3, 3, 2])
-        gain, phase, _ = panels
+        figure = Figure(figsize=(WIDTH_IN, 0.875 * sum(heights)))
+        panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+        gain, phase = panels[:2]
         marks = series_marks(colors)
         for group, response, style in _responses(metrics):
             _draw_response(gain, phase, metrics, response, _line_style(marks[group], colors[group], style))
         for group, transfer in transfers.items():
-            _draw_points(panels, transfer, colors[group], marks[group].marker)
+            if transfer.freq_hz.size:
+                _draw_points(panels, transfer, colors[group], marks[group].marker)
             _draw_lines(gain, phase, metrics, group, (colors[group], marks[group].marker))
         _frame(panels)
         arrange(figure, _handles(metrics, transfers, colors), gap_in=0.2)
@@ -88,7 +95,7 @@ def _draw_response(gain: Axes, phase: Axes, metrics: RunMetrics, response: Respo
     phase.plot(freq, response.phase_deg, **style)
 
 
-def _draw_points(panels: tuple[Axes, Axes, Axes], transfer: Transfer, color: str, marker: str) -> None:
+def _draw_points(panels: Sequence[Axes], transfer: Transfer, color: str, marker: str) -> None:
     gain, phase, coherence = panels
     told = transfer.coherence > transfer.chance
     style: dict[str, Any] = {"color": color, "marker": marker, "linestyle": "none", "markersize": 3.4, "alpha": 0.8}
@@ -112,8 +119,8 @@ def _draw_lines(gain: Axes, phase: Axes, metrics: RunMetrics, group: str, look: 
     phase.plot([one.frequency_hz for one in lines], [one.phase_deg or 0.0 for one in lines], **style)
 
 
-def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
-    gain, phase, coherence = panels
+def _frame(panels: Sequence[Axes]) -> None:
+    gain, phase, *coherence = panels
     gain.set_xscale("log")
     gain.set_yscale("log")
     low, high = gain.get_ylim()
@@ -121,12 +128,13 @@ def _frame(panels: tuple[Axes, Axes, Axes]) -> None:
     decade_axis(gain)
     phase.set_yticks(range(-180, 181, 90))
     phase.set_ylim(-190, 190)
-    coherence.set_ylim(-0.04, 1.06)
-    coherence.set_xlabel("frequency [Hz]")
-    for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=True):
+    for axes in coherence:
+        axes.set_ylim(-0.04, 1.06)
+    panels[-1].set_xlabel("frequency [Hz]")
+    for axes, words in zip(panels, ("gain", "phase [deg]", "coherence"), strict=False):
         axes.set_ylabel(words)
         axes.grid(visible=True)
-    frequency_axis(coherence)
+    frequency_axis(panels[-1])
 
 
 def _handles(metrics: RunMetrics, transfers: Mapping[str, Transfer], colors: Mapping[str, str]) -> list[Line2D | Patch]:

@@ -52,6 +52,15 @@ def test_a_bench_file_is_replayed(spoken, stands, tmp_path):
     assert "has no reference" in refused[2]
 
 
+def test_a_default_folder_that_holds_something_else_is_told_before_the_recording_is_read(spoken, tmp_path, monkeypatch):
+    monkeypatch.setattr("testbed.playback.source.read_plans", lambda _: pytest.fail("the recording was read"))
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "replay_bench").write_text("mine")
+    status, _, err = spoken("replay", "bench.csv", "--filter", "kalman")
+    assert status == 2
+    assert "replay_bench: exists and is no folder of the testbed" in err
+
+
 def pointing_file(folder):
     path = folder / "pointing.yaml"
     path.write_text("tracker: {bandwidth: 5 Hz}\nwindows: [100 ms]\n", encoding="utf-8")

@@ -45,6 +45,14 @@ def test_a_clock_that_is_200_ppm_off_costs_neither_gain_nor_phase():
     assert np.abs(np.angle(found.response / true)).max() < 0.01
 
 
+def test_noise_between_the_lines_does_not_lead_the_lag_astray():
+    """By all frequencies alike this output would be 6.5 s late, which no fit makes up for."""
+    one = record(EXCITATIONS["stepped"], 163, std=1e-3)
+    found = measure_response(one.reference, one.output)
+    assert found.response.freq_hz.size == len(STEPS_HZ)
+    assert abs(found.lag) < 0.1
+
+
 def test_the_frequency_of_a_line_is_fitted():
     one = record(EXCITATIONS["multisine"], 1)
     found = measure_response(one.reference, one.output).response

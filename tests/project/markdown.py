@@ -19,10 +19,11 @@ WIDTH = 120
 # Code, links and formulas are not broken; a blank inside one is held by this.
 _HELD = re.compile(r"`[^`]*`|\[[^\]]*\]\([^)]*\)|\$[^$]*\$")
 _BLANK = "\u2060"
-_SHORT = "".join(rf"(?<!\b{word}\.)" for word in (r"e\.g", r"i\.e", "et al", "vs", "cf", "Trans", "Instrum", "Meas"))
-_END = re.compile(rf"(?<=[.!?]){_SHORT} +(?=[A-Z`*\[(\"0-9])")
+_ABBREVIATED = (r"e\.g", r"i\.e", "et al", "vs", "cf", "Trans", "Instrum", "Meas", "J", "Sound Vib", "no", "eq")
+_SHORT = "".join(rf"(?<!\b{word}\.)" for word in _ABBREVIATED)
+_END = re.compile(rf"(?:(?<=[.!?])|(?<=[.!?]\))){_SHORT} +(?=[A-Z`*\[(\"0-9])")
 _ITEM = re.compile(r"^(\s*)(?:[-*]|\d+\.|:)\s+")
-_VERBATIM = re.compile(r"^\s*(?:\||#|<|>|:{3,}|:[a-z][a-z-]*:|\(|\[[^\]]+\]:|---|={3,}|$)")
+_VERBATIM = re.compile(r"^\s*(?:\||#|<|>|:{3,}|:[a-z][a-z-]*:|\([\w-]+\)=|\[[^\]]+\]:|---|={3,}|$)")
 
 
 def sentences(text: str, width: int) -> list[str]:

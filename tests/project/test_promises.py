@@ -20,6 +20,8 @@ PROGRAM = "import sys; sys.path.insert(0, {folder!r}); from promises import Prom
         ("Promise('a', 2.0, 1.0), Promise('b', 2.0, 2.1)", 1),
         ("Promise('b', 2.0, 1.9, at_most=False)", 1),
         ("Promise('a', 2.0, float('nan'))", 1),
+        ("Promise('a lowest eigenvalue', 1e-17, -1e-16, at_most=False)", 1),
+        ("Promise('hits', 3, 0, at_most=False)", 1),
     ],
 )
 def test_a_miss_is_said(tmp_path, promises, status):

@@ -52,6 +52,13 @@ def test_every_preset_and_public_name_stands_on_its_page(generated):
     assert [name for name in testbed.__all__ if name != "__version__" and f"testbed.{name}\n" not in names] == []
 
 
+def test_every_command_has_its_whole_summary(generated):
+    """Typer's generator ends a summary after 45 letters, in the middle of a sentence."""
+    listed = re.findall(r"^\* `(\w+)`: (.*)$", generated.commands(), re.MULTILINE)
+    assert {"run", "train", "inspect"} <= {name for name, _ in listed}
+    assert [one for one in listed if not one[1].endswith(".")] == []
+
+
 def test_every_page_is_in_the_contents():
     contents = set(re.findall(r"^[\w/]+$", (DOCS / "index.md").read_text("utf-8"), re.MULTILINE))
     pages = {str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")}

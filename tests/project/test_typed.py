@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("docs/*/*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 # In the text between backticks, and a line of a block each.
 INLINE = re.compile(r"`((?:testbed|python) [^`\n]+)`")
-BLOCK = re.compile(r"^```(?:sh|bash)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(?:sh|console)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Options of the interpreter and of what it is asked to be.
 FOREIGN = ("python -m", "python -c")
 

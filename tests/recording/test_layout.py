@@ -100,7 +100,7 @@ def titles(part):
             yield from titles(inner)
 
 
-def plots(**extremes):
+def plots(*, live=False, **extremes):
     """Return the plots of a run by their title; extremes of its signals after settle by name and diagnostic."""
     entities = {f"/fusion/{name.replace('__', '/')}": found for name, found in extremes.items()}
     shown = blueprint(
@@ -111,6 +111,7 @@ def plots(**extremes):
         model=None,
         clock=Clock(20e3, 400_000, (10.0, 12.0)),
         unit="deg/s",
+        live=live,
     )
     return {view.name: view for view in views(shown.root_container)}
 
@@ -137,6 +138,12 @@ def test_errors_stand_beside_each_other_in_one_scale_but_for_one_that_would_be_f
     assert scale(found["Error of a [deg/s]"]) == scale(found["Error of b [deg/s]"]) == pytest.approx((-2.2, 2.2))
     assert scale(found["Error of c [deg/s]"]) is None
     assert found["Error of a [deg/s]"].contents == ["/fusion/a/error"]
+
+
+def test_who_looks_on_sees_the_last_seconds_instead_of_what_has_not_come_yet():
+    watched, kept = plots(live=True, a__rate=None), plots(a__rate=None)
+    assert set(watched) - set(kept) == {"Rate, the last 2 s [deg/s]"}
+    assert set(kept) - set(watched) == {"Rate ±50 ms at the cursor [deg/s]"}
 
 
 def test_the_start_sets_no_scale_but_that_of_counts_and_logarithms():

@@ -11,9 +11,9 @@ from rerun.chunk import RrdReader
 
 from testbed.errors import RunError
 from testbed.pages.palette import TRUTH
-from testbed.recording.viewer import headless_viewer, live_window, settled_picture
+from testbed.recording.viewer import headless_viewer, live_window
 from tests.cli.test_grammar import say
-from tests.recording.test_picture import covered, pixels
+from tests.recording.test_picture import covered, picture_of, pixels
 from tests.scenes import short_file
 
 SIZE = (1200, 800)
@@ -52,7 +52,7 @@ def test_the_viewer_sees_each_block_and_the_file_is_that_of_a_run_unwatched(clie
             (line,) = (one for one in client.get_state().recordings[-1].timelines if one.name == "sim_time")
             # Of the last block the open bin is held back: 15 samples of 50 us, and at most a pose's 20 ms.
             assert line.end / 1e9 == pytest.approx(k + 1.0, abs=0.03)
-        rows_, columns = covered(pixels(settled_picture(client, "Rate, whole run [deg/s]")), TRUTH)
+        rows_, columns = covered(pixels(picture_of(client, "Rate, whole run [deg/s]")), TRUTH)
         assert rows_ > 0.2
         assert columns > 0.2
     run.record(tmp_path / "alone.rrd")

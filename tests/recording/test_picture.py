@@ -49,6 +49,12 @@ def shown(viewer, recording):
     return viewer
 
 
+def picture_of(client, name):
+    """Return a settled PNG of the view of that name."""
+    (view,) = (view.view_id for view in client.get_state().views if view.name == name)
+    return settled_picture(client, lambda: client.take_screenshot(view))
+
+
 def pixels(png):
     return np.round(matplotlib.image.imread(io.BytesIO(png))[..., :3] * 255).astype(int)
 
@@ -71,14 +77,14 @@ def test_layout_opens_with_its_views_and_without_complaint(shown):
 
 def test_fast_oscillation_is_drawn_with_its_amplitude(shown):
     """A mean of neighbouring samples, the viewer's default, would be a flat line at zero."""
-    rows, columns = covered(pixels(settled_picture(shown, "Error of kalman [deg/s]")), FILTERS[0])
+    rows, columns = covered(pixels(picture_of(shown, "Error of kalman [deg/s]")), FILTERS[0])
     # The plot leaves a margin below for the axis, on the left for its numbers, and 5 % above and below the data.
     assert rows > 0.6
     assert columns > 0.6
 
 
 def test_detail_shows_all_rates_in_their_colors(shown):
-    image = pixels(settled_picture(shown, "Rate, every sample from 6 to 6.5 s [deg/s]"))
+    image = pixels(picture_of(shown, "Rate, every sample from 6 to 6.5 s [deg/s]"))
     for color in (SENSORS[0], SENSORS[1], FILTERS[0], TRUTH):
         rows, columns = covered(image, color)
         assert rows > 0.2, color
@@ -94,7 +100,7 @@ def test_lost_readings_are_a_gap_in_the_line(viewer, synthetic_run, tmp_path):
     run.readings["mhd_ars"] = np.full(run.n_time, 0.03)  # above all others
     run.readings["mhd_ars"][124_000:126_000] = np.nan
     show(viewer, run.record(tmp_path / "gap.rrd", settle=6.0, detail=(6.0, 8.0)), 6.2)
-    image = pixels(settled_picture(viewer, "Rate, every sample from 6 to 6.5 s [deg/s]"))
+    image = pixels(picture_of(viewer, "Rate, every sample from 6 to 6.5 s [deg/s]"))
     blue = image[..., 2] - image[..., 0] > 40  # its edges are mixed with the background
     drawn = np.flatnonzero(blue[blue.sum(axis=1).argmax()])  # the row of pixels of the line, not of the legend
     steps, span = np.diff(drawn), np.ptp(drawn)
@@ -103,7 +109,7 @@ def test_lost_readings_are_a_gap_in_the_line(viewer, synthetic_run, tmp_path):
 
 
 def test_fluid_profile_fills_the_height_of_the_channel(shown):
-    image = pixels(settled_picture(shown, "Fluid velocity profile, mhd_ars"))
+    image = pixels(picture_of(shown, "Fluid velocity profile, mhd_ars"))
     rows, columns = covered(image, SENSORS[0])
     # The channel takes 90 of the 131.6 units of the view's height.
     assert 0.45 < rows < 0.7
@@ -111,7 +117,7 @@ def test_fluid_profile_fills_the_height_of_the_channel(shown):
 
 
 def test_turntable_and_its_sensor_are_seen(shown):
-    image = pixels(settled_picture(shown, "Turntable"))
+    image = pixels(picture_of(shown, "Turntable"))
     # The disc is a bluish grey (184, 191, 199), shaded; slab and background are darker.
     lit = (np.ptp(image, axis=-1) < 30) & (image.min(axis=-1) > 110)
     assert lit.mean() > 0.05

@@ -7,6 +7,7 @@ import pytest
 
 import testbed
 from testbed.report import run_figures
+from testbed.report.bode import bode_figure
 from testbed.report.digest import digest_run
 from testbed.runs.results import RunRecord
 
@@ -81,8 +82,11 @@ def test_the_line_of_the_bode_plot_is_that_of_the_least_squares(run):
         assert np.degrees(np.angle(transfer.response[k])) == pytest.approx(line.phase_deg, abs=0.6)
 
 
-def test_the_bode_plot_has_gain_phase_and_coherence(figures):
+def test_the_bode_plot_has_gain_phase_and_coherence_but_at_rest(figures, run):
     assert [axes.get_ylabel() for axes in figures["bode"].axes] == ["gain", "phase [deg]", "coherence"]
+    still = bode_figure(run.metrics, {}, dict.fromkeys(digest_run(run).transfers, "k"))
+    assert [axes.get_ylabel() for axes in still.axes] == ["gain", "phase [deg]"]
+    assert still.axes[-1].get_xlabel() == "frequency [Hz]"
     assert [axes.get_title(loc="left") for axes in figures["whiteness"].axes] == [
         "innovations of mhd_ars",
         "innovations of mems_gyro",

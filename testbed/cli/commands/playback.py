@@ -86,6 +86,10 @@ def replay(
 
     wanted = None if outputs is None else _list(outputs, "--outputs")
     check_target(out, wanted)
+
+    def target(name: str) -> Path:
+        return out or Path("runs") / f"replay_{name}"
+
     length = None if settle is None else 0.0 if settle.strip() == "0" else quantity(settle, "s", "2 s", "--settle")
     made = prepare(
         log or [],
@@ -98,16 +102,17 @@ def replay(
         settle=length,
         lines=[quantity(one, "Hz", "10 Hz", "--lines") for one in _list(lines, "--lines")],
         plugins=plugin or (),
+        named=lambda name: check_target(target(name), wanted),
     )
     for words in replay_words(made.name, made.lineup.duration, made.facts):
         output.note(words)
     # Before the estimate: what stands against a recording is worth more than what comes of it.
     output.warn(str(finding) for finding in made.verdict.unfixed)
-    target = out or Path("runs") / f"replay_{made.name}"
+    folder = target(made.name)
     with output.progress(made.name, made.lineup.duration) as tick:
-        run = play_back(made, target, outputs=wanted, progress=tick)
-    document = {**run.metrics.to_dict(), "written": str(target)}
-    output.show(document, lambda: print_replay(run.metrics, made.verdict, target))
+        run = play_back(made, folder, outputs=wanted, progress=tick)
+    document = {**run.metrics.to_dict(), "written": str(folder)}
+    output.show(document, lambda: print_replay(run.metrics, made.verdict, folder))
     if made.verdict.unfixed:
         raise typer.Exit(MISSED)
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
+from testbed.fusion.analysis.finding import QUANTILE
 from testbed.fusion.analysis.paths import Grid, Trace
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ _LEAST_LINES = 8
 # Of the clean path's power at most this share may be noise, and the gain must stand out this far [std], for a motion to
 # be common: the search alone finds 5.
 _MOST_NOISE, _STANDS_OUT = 0.05, 10.0
+# Of a motion that both feel each shows this much at least, whatever its gain is by mistake short of its unit.
+_FOLLOWS = 0.5
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,12 @@ class Agreement:
         The largest |a / (kappa c) - 1| of an octave [-] that is significant at 1e-4, 0 if none is.
     departs_at : float
         The middle of that octave [Hz].
+    moved : tuple of bool
+        Whether most of what the noisy path, and the clean one, show stands out of its noise as lines do.
+    powers : tuple of float
+        Of the two, under one weight.
+    own : float
+        Share of the noisy path's power beyond noise that does not follow the clean one [-].
     """
 
     gain: float
@@ -76,6 +85,16 @@ class Agreement:
     ambiguity: float
     departure: float
     departs_at: float
+    moved: tuple[bool, bool] = (False, False)
+    powers: tuple[float, float] = (0.0, 0.0)
+    own: float = 0.0
+
+    @property
+    def misses(self) -> tuple[bool, bool]:
+        """Whether the noisy one lacks half or more of what the clean one shows, and the other way round."""
+        most = abs(self.gain) + QUANTILE * math.sqrt(self.covariance[0, 0])
+        noisy, clean = self.powers
+        return most < _FOLLOWS, clean < _FOLLOWS**2 * noisy
 
 
 class _Fit(NamedTuple):
@@ -84,6 +103,9 @@ class _Fit(NamedTuple):
     theta: FloatArray
     covariance: FloatArray
     share: float
+    moved: tuple[bool, bool]
+    powers: tuple[float, float]
+    own: float
     swing: float
     departure: float
     departs_at: float
@@ -143,9 +165,8 @@ class Pair:
         common = found.share < _MOST_NOISE and abs(gain) > _STANDS_OUT * math.sqrt(covariance[0, 0])
         # Steps that lead far beyond all that was searched follow no motion.
         common = common and abs(offset) < 2.0 * _LONGEST and abs(rate) < 2.0 * _FASTEST
-        return Agreement(
-            gain, offset, rate, middle, covariance, common, found.swing, ambiguity, found.departure, found.departs_at
-        )
+        shape = (found.departure, found.departs_at, found.moved, found.powers, found.own)
+        return Agreement(gain, offset, rate, middle, covariance, common, found.swing, ambiguity, *shape)
 
     def _fitted(self, noisy: Trace, middle: float, gain: float) -> _Fit:
         w, span = self.grid.weight(noisy, self.clean), self.grid.t - middle
@@ -167,7 +188,13 @@ class Pair:
         swing = math.sqrt(normal[1, 1] / normal[0, 0])
         # What the weight leaves of the record.
         inverse *= w.size * float(np.sum(w**4)) / power**2
-        return _Fit(theta, inverse, share, swing, *self._departure(y - fitted, fitted, weight))
+        moved = self._moved(y, self._a_noise, weight), self._moved(X[0], self._c_noise, weight)
+        total = float(np.sum(weight * np.abs(y) ** 2))
+        # Noise leaves two of each line, and what that scatters by is no motion.
+        left = float(np.sum(weight * np.abs(y - fitted) ** 2)) - 2.0 * y.size - QUANTILE * 2.0 * math.sqrt(y.size)
+        own = left / max(total - 2.0 * y.size, abs(left), 1e-300)
+        shares = share, moved, (total, float(normal[0, 0])), own
+        return _Fit(theta, inverse, *shares, swing, *self._departure(y - fitted, fitted, weight))
 
     def _columns(self, a: FloatArray, w: FloatArray, span: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the spectra of a, and of c with its derivatives by offset and rate, shapes (n_freq,), (3, n_freq)."""
@@ -194,6 +221,11 @@ class Pair:
             if np.count_nonzero(mine) >= _LEAST_LINES:
                 scale[mine] = max(float(np.median(ratio[mine])), 1e-12)
         return scale
+
+    def _moved(self, path: ComplexArray, noise: FloatArray, weight: FloatArray) -> bool:
+        """Return whether lines are most of a path, beside noise of whatever size."""
+        like_noise = float(np.sum(weight * self._scale(path, noise) * noise))
+        return like_noise < _FOLLOWS * float(np.sum(weight * np.abs(path) ** 2))
 
     def _departure(self, residual: ComplexArray, fitted: ComplexArray, weight: FloatArray) -> tuple[float, float]:
         """Return the largest significant departure of an octave that holds motion, and its frequency [Hz]."""

@@ -19,6 +19,8 @@ from scipy.fft import rfft, rfftfreq
 from testbed.signals import LinearFilter
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from testbed.fusion.belief import SensorBelief
     from testbed.signals import ComplexArray, FloatArray
 
@@ -27,6 +29,8 @@ WINDOW = 2
 # Where the two are compared [Hz]: below, what the window leaks of a drift; above a tenth of the rate, holds differ.
 _LOWEST_HZ, _HIGHEST_HZ, _HIGHEST_SHARE = 0.4, 200.0, 0.1
 _STEPS, _SHRINK = 4, 2.0
+# What is missing of a second without harm: so long at a time [s], a straight line there, and such a share of it.
+_SHORT_GAP, _MOST_MISSING = 0.01, 0.01
 
 
 class Calibrated(NamedTuple):
@@ -72,6 +76,9 @@ class Calibration:
         Of how many readings, from that instant on, each of the noisy and of the clean sensor's is the mean.
     gain_std, delay_std : float
         Of the prior [-], [s].
+    at_rest : bool
+        Whether the sensors were at rest before the first reading. If not, and after readings that are missing, seconds
+        are left out until the dynamics, which begin at rest, have settled.
     """
 
     def __init__(
@@ -82,6 +89,7 @@ class Calibration:
         means: tuple[int, int],
         gain_std: float,
         delay_std: float,
+        at_rest: bool,
     ) -> None:
         self._through = tuple(
             LinearFilter(*other.polynomials(), sample_rate_hz=sample_rate_hz) for other in (clean, noisy)
@@ -102,6 +110,9 @@ class Calibration:
         self._taken = np.array([_of_mean(many, self._freq / sample_rate_hz) for many in means])
         self._prior = np.array([gain_std**-2, delay_std**-2])
         self._last = np.full((2, self._block), np.nan)
+        # How many blocks the dynamics take to settle, and how many of each path are left of that.
+        self._settling = _settling(noisy, clean)
+        self._left = [0 if at_rest else self._settling] * 2
         self._cross, self._power = np.zeros(self._freq.size, complex), np.zeros(self._freq.size)
         self._theta = np.array([1.0, 0.0])
 
@@ -111,7 +122,8 @@ class Calibration:
         Parameters
         ----------
         noisy, clean : ndarray, shape (n_block,)
-            Readings of both sensors at the same instants [rad/s], NaN where there is none.
+            Readings of both sensors at the same instants [rad/s], NaN where there is none: of 1 % of them, and of 10 ms
+            at a time, a straight line takes the place; with more the second is left out.
         """
         paths = np.array([self._path(i, one) for i, one in enumerate((noisy, clean))])
         both = np.concatenate([self._last, paths], axis=1)
@@ -124,13 +136,24 @@ class Calibration:
         return self._solved()
 
     def _path(self, which: int, z: FloatArray) -> FloatArray:
-        """Return a block of one path; all of it is missing with one reading, and the filter goes on with the last."""
+        """Return a block of one path, missing whole where too much is, and after it until the dynamics have settled."""
         good = np.isfinite(z)
-        if good.all():
-            return self._through[which].process(z)
-        at = np.arange(z.size)
-        self._through[which].process(np.interp(at, at[good], z[good]) if good.any() else np.zeros(z.size))
-        return np.full(z.size, math.nan)
+        if not good.all():
+            at = np.arange(z.size)
+            z = np.interp(at, at[good], z[good]) if good.any() else np.zeros(z.size)
+            if not self._bridged(good):
+                self._left[which] = self._settling + 1
+        path = self._through[which].process(z)
+        if self._left[which] == 0:
+            return path
+        self._left[which] -= 1
+        return np.full(path.size, math.nan)
+
+    def _bridged(self, good: NDArray[np.bool_]) -> bool:
+        """Return whether so little of a block is missing that a straight line stands for it."""
+        there = np.concatenate([[-1], np.flatnonzero(good), [good.size]])
+        longest = (np.diff(there).max() - 1) / self._block
+        return bool(longest <= _SHORT_GAP and 1.0 - good.mean() <= _MOST_MISSING)
 
     def _solved(self) -> Calibrated:
         """Return the least squares of the sums and the prior by Gauss-Newton steps."""
@@ -152,6 +175,16 @@ class Calibration:
             self._theta = self._theta + step
         std = np.sqrt(1.0 / np.diag(normal))
         return Calibrated(*map(float, (*self._theta, *std)))
+
+
+def _settling(*beliefs: SensorBelief) -> int:
+    """Return after how many seconds a thousandth is left of what dynamics start with, slower ones than compared aside.
+
+    What is slower than the lowest frequency is smooth, and the window keeps it out.
+    """
+    poles = np.concatenate([np.roots(one.polynomials()[1]) for one in beliefs])
+    seen = -poles.real[-poles.real > 2.0 * math.pi * _LOWEST_HZ]
+    return math.ceil(math.log(1e3) / seen.min()) if seen.size else 1
 
 
 def _noise(one: SensorBelief, freq_hz: FloatArray) -> FloatArray:

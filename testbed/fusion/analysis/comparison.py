@@ -12,6 +12,7 @@ from testbed.fusion.analysis.agreement import Agreement, Pair
 from testbed.fusion.analysis.continuity import repeated
 from testbed.fusion.analysis.contradictions import (
     Names,
+    axis_finding,
     bias_findings,
     gain_findings,
     shape_findings,
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 # What two sensors must have in common [s], and how many readings of the slower one.
 _LEAST_SECONDS, _LEAST_READINGS = 2.0, 200
+# From this share of a sensor's motion on that is its own, what little it has of the other one's is no common motion.
+_OWN = 0.8
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,8 @@ class Compared:
         The noisy path with its stamps put right [rad/s].
     noise, clean_noise : NoiseRatio or None
         Of either, over its belief.
+    apart : bool
+        They do not show the same motion.
     """
 
     names: Names
@@ -56,6 +61,7 @@ class Compared:
     path: FloatArray
     noise: NoiseRatio | None
     clean_noise: NoiseRatio | None
+    apart: bool
 
     @property
     def factors(self) -> dict[str, float]:
@@ -68,6 +74,9 @@ class Compared:
     def findings(self) -> list[Finding]:
         """What the two contradict each other in, and the noisy one its belief."""
         names, found = self.names, self.found
+        if self.apart:
+            # What is the noise of each, and what its own motion, nothing tells.
+            return [axis_finding(found, names)]
         factors = self.factors
         shape = list(shape_findings(self.pair, found, self.noise, names))
         units = {names.noisy: self.pair.noisy.said, names.clean: self.pair.clean.said}
@@ -120,7 +129,14 @@ def compared(noisy: tuple[str, Trace], clean: tuple[str, Trace], clean_noise: No
         return f"{both} one of them always reads the same"
     found = pair.agreement()
     path = pair.path(pair.put_right(found.offset, found.rate, found.middle) if found.common else one)
-    return Compared(names, pair, found, path, noise_beside(pair, path), clean_noise)
+    apart = found.own > _OWN if found.common else _are_apart(found)
+    return Compared(names, pair, found, path, noise_beside(pair, path), clean_noise, apart)
+
+
+def _are_apart(found: Agreement) -> bool:
+    """Return whether one of two sensors does not show what moved the other one."""
+    (noisy_moved, clean_moved), (noisy_misses, clean_misses) = found.moved, found.misses
+    return (clean_moved and noisy_misses) or (noisy_moved and clean_misses)
 
 
 def without_repeats(trace: Trace) -> Trace:

@@ -132,6 +132,24 @@ def _unit_name(value: float, other: str) -> str:
     return next((text for text, one in units.items() if math.isclose(value, one, rel_tol=1e-6)), other)
 
 
+def axis_finding(found: Agreement, names: Names) -> Finding:
+    """Return that one sensor does not show the motion of the other.
+
+    Parameters
+    ----------
+    found : Agreement
+        Of the two.
+    names : Names
+        What it is said of.
+    """
+    (name, other), half = names.of_gain(), QUANTILE * math.sqrt(found.covariance[0, 0])
+    words = (
+        f"it and {other} do not show the same motion: other axes or mountings, times more than 0.5 s or clocks more "
+        "than 1 % apart, or both far noisier than believed; compare the channels and their stamps"
+    )
+    return Finding("axis", name, found.gain, found.gain - half, found.gain + half, "1", words)
+
+
 def sign_findings(found: Agreement, names: Names, unit: float) -> Iterator[Finding]:
     """Yield whether the readings of two sensors are of opposite sign.
 

@@ -9,6 +9,8 @@ from typing import Literal
 from testbed.units import DEG
 
 Kind = Literal[
+    "axis",
+    "swapped",
     "sign",
     "unit",
     "gain",
@@ -54,15 +56,16 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``sign``, ``unit``, ``gain``, ``offset``, ``rate``, ``bandwidth``, ``saturation``, ``bias``, ``belief``,
-        ``repeats`` or ``gaps``.
+        ``axis``, ``swapped``, ``sign``, ``unit``, ``gain``, ``offset``, ``rate``, ``bandwidth``, ``saturation``,
+        ``bias``, ``belief``, ``repeats`` or ``gaps``.
     sensor : str
         The one that is named, since two that contradict each other do not tell which is wrong.
     value, lower, upper : float
         What was found, and its interval at 1e-4. A gain, a unit and a sign are the factor that the readings are too
-        large by; an offset is by how much the stamps are late at the record's first one [s]; a rate by how much they
-        run fast [-]; a bandwidth is where the noise ends [Hz]; a bias is in [rad/s]; of a belief it is the noise over
-        the believed one; of ``saturation``, ``repeats`` and ``gaps`` the share of the readings.
+        large by, and of an axis what of the other one's motion they show; an offset is by how much the stamps are late
+        at the record's first one [s]; a rate by how much they run fast [-]; a bandwidth is where the noise ends [Hz]; a
+        bias is in [rad/s]; of a belief it is the noise over the believed one; of ``saturation``, ``repeats`` and
+        ``gaps`` the share of the readings.
     unit : str
         SI unit of the three, "1" for a number.
     remedy : str

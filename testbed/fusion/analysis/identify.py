@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from testbed.fusion.analysis.whitening import parts, whitened
 from testbed.fusion.belief import SensorBelief
 
 if TYPE_CHECKING:
@@ -122,7 +123,9 @@ def identify(
     pole_pairs: int = 0,
     blind_at_dc: bool = False,
     weight: FloatArray | None = None,
+    shared: ComplexArray | None = None,
     delay: float | None = None,
+    tolerance: float = 1e-14,
 ) -> Identified:
     r"""Fit a strictly proper, stable transfer function to samples of a frequency response.
 
@@ -144,8 +147,14 @@ def identify(
         Force G(0) = 0, as for an MHD sensor.
     weight : ndarray, shape (n_freq,), optional
         Weight w of each sample [-]; default 1: relative errors count alike.
+    shared : ndarray of complex, shape (n_freq,), optional
+        What one standard deviation of an error that all samples have in common, such as that of a clock, adds to H, the
+        weights being those of one standard deviation of each sample's own [-].
     delay : float, optional
         Where the search for a dead time begins [s], of either sign; left out there is none.
+    tolerance : float, optional
+        Relative change of the misfit and of the places at which the search ends [-]; what noise has no more digits for
+        is found sooner with 1e-8.
 
     Returns
     -------
@@ -161,6 +170,7 @@ def identify(
 
     freq, H = np.asarray(freq_hz, float), np.asarray(response, complex)
     w = np.ones(freq.size) if weight is None else np.asarray(weight, float)
+    common = np.zeros(2 * freq.size) if shared is None else parts(w * shared / H)
     n_pole = real_poles + 2 * pole_pairs
     if n_pole < 1 or freq.shape != H.shape or freq.size < 2 * n_pole or w.shape != freq.shape:
         msg = (
@@ -185,19 +195,21 @@ def identify(
 
     def residual(place: FloatArray) -> FloatArray:
         wanted = in_time(place)
-        error = w * (_fitted(s, wanted, w, denominator(place), blind_at_dc)[1] / wanted - 1.0)
-        return np.concatenate([error.real, error.imag])
+        fit = _fitted(s, wanted, w, common, denominator(place), blind_at_dc)[1]
+        return whitened(parts(w * (fit / wanted - 1.0)), common)
 
     tried = []
     for share in _SPREADS:
         start = np.concatenate([_start(np.abs(s), real_poles, pole_pairs, share), late])
         rounds = _ROUNDS * start.size
-        tried.append(least_squares(residual, start, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=rounds))
+        tried.append(
+            least_squares(residual, start, method="lm", xtol=tolerance, ftol=tolerance, gtol=tolerance, max_nfev=rounds)
+        )
         if tried[-1].cost < _EXACT:
             break
     place = min(tried, key=lambda one: float(one.cost)).x
     D, wanted = denominator(place), in_time(place)
-    N, G = _fitted(s, wanted, w, D, blind_at_dc)
+    N, G = _fitted(s, wanted, w, common, D, blind_at_dc)
     powers = unit ** np.arange(n_pole + 1.0)
     found = 0.0 if delay is None else float(place[-1]) / unit
     return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / wanted - 1.0))), found)
@@ -232,14 +244,14 @@ def _denominator(place: FloatArray, real_poles: int) -> FloatArray:
 
 
 def _fitted(
-    s: ComplexArray, H: ComplexArray, w: FloatArray, D: FloatArray, blind_at_dc: bool
+    s: ComplexArray, H: ComplexArray, w: FloatArray, common: FloatArray, D: FloatArray, blind_at_dc: bool
 ) -> tuple[FloatArray, ComplexArray]:
     """Return the best N for the poles of D (highest power first, degree one below D's) and G = N/D."""
     n = D.size - 1
     lowest = 1 if blind_at_dc else 0
     basis = s[:, None] ** np.arange(n - 1, lowest - 1, -1) / np.polyval(D, s)[:, None]
-    rows = (w / H)[:, None] * basis
-    system, wanted = np.concatenate([rows.real, rows.imag]), np.concatenate([w, np.zeros_like(w)])
+    system = whitened(parts((w / H)[:, None] * basis), common)
+    wanted = whitened(np.concatenate([w, np.zeros_like(w)]), common)
     size = np.linalg.norm(system, axis=0)
     share = np.linalg.lstsq(system / size, wanted, rcond=None)[0]
     fit = np.where(np.abs(share) > _ROUNDING * np.linalg.norm(w), share, 0.0) / size

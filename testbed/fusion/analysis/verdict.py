@@ -28,7 +28,7 @@ _LEAST_READINGS = 100
 # Where the sensors' noise is compared to find the cleanest [Hz].
 _BAND_HZ = np.geomspace(1.0, 30.0, 16)
 # Kinds of findings that another sensor would explain.
-_OF_BELIEF = ("belief", "bandwidth")
+_OF_BELIEF = ("belief", "bandwidth", "axis")
 
 
 def verdict(
@@ -99,7 +99,7 @@ def _exchanged(traces: Mapping[str, Trace], found: Verdict) -> Verdict:
         return found
     worst = next(finding for finding in found.findings if finding.kind in _OF_BELIEF)
     remedy = f"the readings of {one} are as is believed of {other}, and the other way round: exchange the two names"
-    return Verdict((replace(worst, remedy=remedy),), swapped.undecided)
+    return Verdict((replace(worst, kind="swapped", remedy=remedy),), swapped.undecided)
 
 
 def _judged(kept: Mapping[str, Trace]) -> Verdict:
@@ -119,7 +119,8 @@ def _judged(kept: Mapping[str, Trace]) -> Verdict:
         undecided.append(
             f"{clean}: sign, unit, gain, offset, rate and bias: there is no other sensor to compare it with"
         )
-    findings += loudness_findings(clean, noise, factors.get(clean, 1.0))
+    if not any(pair.apart for pair in pairs):
+        findings += loudness_findings(clean, noise, factors.get(clean, 1.0))
     for name, trace in kept.items():
         findings += continuity_findings(name, trace, factors.get(name, 1.0))
     return Verdict(tuple(_once(findings)), tuple(undecided))
@@ -175,7 +176,8 @@ def _by_majority(pairs: list[Compared]) -> list[Compared]:
     """
     everywhere = set.intersection(*({finding.kind for finding in pair.findings} for pair in pairs))
     timed = not everywhere & {"sign", "offset", "rate"}
-    return [replace(pair, names=replace(pair.names, timed=timed, scaled="gain" not in everywhere)) for pair in pairs]
+    scaled = not everywhere & {"gain", "axis"}
+    return [replace(pair, names=replace(pair.names, timed=timed, scaled=scaled)) for pair in pairs]
 
 
 def _once(findings: Iterable[Finding]) -> list[Finding]:

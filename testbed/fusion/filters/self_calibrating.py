@@ -143,8 +143,7 @@ class SelfCalibrating(BlockFilter):
     Parameters: ClassVar[type[Part]] = SelfCalibratingParameters
     needs_both = True
     caution = "what both sensors share, a gain or a delay, cannot be seen"
-    # Inside a constant rate the first seconds are part of what gain and delay are learned from.
-    start_leaves = (0.0045 * DEG, 0.05 * DEG)
+    start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(
         self,
@@ -170,7 +169,8 @@ class SelfCalibrating(BlockFilter):
         slow_hz = self.schedule.sample_rate_hz / self._stride
         one, other = (belief[self.schedule.sensors[i]] for i in (self._noisy, self._clean))
         means = self._stride // strides[self._noisy], self._stride // strides[self._clean]
-        self._calibration = Calibration(one, other, slow_hz, means, parameters.gain_std, parameters.delay_std)
+        priors, at_rest = (parameters.gain_std, parameters.delay_std), parameters.start == "rest"
+        self._calibration = Calibration(one, other, slow_hz, means, *priors, at_rest=at_rest)
         self._known = Calibrated(1.0, 0.0, parameters.gain_std, parameters.delay_std)
         self._gain, self._lags = 1.0, np.full(2, _LEAST_LAG)
         self._second = np.full((2, round(slow_hz) * self._stride), math.nan)
@@ -263,12 +263,15 @@ class SelfCalibrating(BlockFilter):
         return {name: copy(getattr(self._inner, name)) for name in _INNER[self._name][1]}
 
     def _second_of(self, which: int) -> FloatArray:
-        """Return the readings of a sensor in the second at the slow rate, the mean of those of a fast one [rad/s]."""
-        z, stride = self._second[which], self.schedule.strides[which]
-        due = z[::stride]
-        due = np.where(np.isfinite(due), due, math.nan)
-        many = self._stride // stride
-        means: FloatArray = due.reshape(-1, many).mean(axis=1)
+        """Return the readings of a sensor in the second at the slow rate [rad/s], of a fast one the mean of those that
+        are there, if they are half of them.
+        """
+        stride = self.schedule.strides[which]
+        due = self._second[which, ::stride].reshape(-1, self._stride // stride)
+        good = np.isfinite(due)
+        n = good.sum(axis=1)
+        total = np.where(good, due, 0.0).sum(axis=1)
+        means: FloatArray = np.where(2 * n >= due.shape[1], total / np.maximum(n, 1), math.nan)
         return means
 
     def _built(self, belief: Mapping[str, SensorBelief]) -> ModelFilter:

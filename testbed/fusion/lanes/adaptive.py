@@ -86,7 +86,10 @@ class AdaptiveLanes:
     ) -> dict[int, EstimateBlock]:
         lanes = padded(pack)
         first, W = filters[pack[0]], np.zeros((len(self._rows), LANES))
-        sensors = np.stack([filters[m]._sensors for m in lanes], axis=1)
+        # Not by np.stack, which looks for a common type of records field by field.
+        sensors = np.empty((len(self._memory), LANES), dtype=first._sensors.dtype)
+        for lane, m in enumerate(lanes):
+            sensors[:, lane] = filters[m]._sensors
         W[self._states] = np.stack([filters[m]._x for m in lanes], axis=1)
         W[self._covariance] = np.stack([filters[m]._P for m in lanes], axis=2)[self._half]
         for i, row in enumerate(self._memory):

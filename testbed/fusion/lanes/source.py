@@ -25,6 +25,7 @@ GATE = 1000.0
 MEMORY = ("R", "lowest", "highest", "hits", "innovation", "reading", "increment", "window", "band")
 # Steps that are worked on at a time: a number of each lane takes 32 kB for them.
 PART = 256
+# Unsigned places in what moves readings and estimates: a signed one would be looked at, whether it counts from the end.
 HEAD = f"""\
 from math import sqrt
 
@@ -44,14 +45,16 @@ def first_of(due):
 def spread(Z, i, begin, n, first, stride, z):
     for s in range({LANES}):
         own = Z[s]
-        for k in range(first, n, stride):
-            z[k, s] = own[i, begin + k]
+        for m in range((n - first + stride - 1) // stride):
+            k = np.uint64(first + m * stride)
+            z[k, s] = own[i, np.uint64(begin) + k]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def collect(part, first, stride, found):
     for s in range(found.shape[0]):
-        for k in range(first, found.shape[1], stride):
+        for m in range((found.shape[1] - first + stride - 1) // stride):
+            k = np.uint64(first + m * stride)
             found[s, k] = part[k, s]
 
 

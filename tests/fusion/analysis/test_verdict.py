@@ -173,9 +173,28 @@ def test_sensors_that_were_swapped_are_told(moving):
     readings, time_ns = moving
     names = {"mhd_ars": "mems_gyro", "mems_gyro": "mhd_ars"}
     found = verdict(*({names[key]: one for key, one in each.items()} for each in (readings, time_ns)), EQ39)
-    assert len(found.findings) == 1
-    assert found.findings[0].kind in {"belief", "bandwidth"}
+    assert [one.kind for one in found.findings] == ["swapped"]
     assert "the readings of mems_gyro are as is believed of mhd_ars" in found.findings[0].remedy
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        still,
+        lambda t: 0.1 * DEG * np.sin(18.0 * np.pi * t),
+        lambda t: 0.01 * four(t) + 0.1 * DEG * np.sin(18.0 * np.pi * t),
+    ],
+    ids=["still", "another line", "one in a hundred of it beside another line"],
+)
+@pytest.mark.parametrize("turned", ["mhd_ars", "mems_gyro"])
+def test_sensors_of_other_axes_are_told_and_nothing_else(others, turned):
+    """What of each is its noise nothing tells then: a line would be taken for a noise of another bandwidth."""
+    _, readings = record(ramped(four), DURATION, 7)
+    _, other = record(ramped(others), DURATION, 8)
+    spoilt = readings | {turned: other[turned]}
+    found = verdict(spoilt, stamps_of(spoilt), EQ39)
+    assert [one.kind for one in found.findings] == ["axis"]
+    assert remedied(spoilt, stamps_of(spoilt), found).verdict.unfixed == found.findings
 
 
 def test_missing_stamps_are_gaps_as_missing_readings_are(moving):

@@ -204,7 +204,9 @@ def test_the_root_stays_usable_over_two_million_steps() -> None:
     """
     rates, silent = dict.fromkeys(RATES, 20000.0), dict.fromkeys(RATES, np.zeros(200_000))
     root, exact = (
-        Kalman(load_belief("paper2"), rates, KalmanParameters(form=form, precision=precision))
+        Kalman(
+            load_belief("paper2"), rates, KalmanParameters(form=form, precision=precision, coloured=False, gate=False)
+        )
         for form, precision in (("square_root", "single"), ("joseph", "double"))
     )
     for _ in range(10):

@@ -15,7 +15,7 @@ from testbed.fusion.two_paths.design import band_end, input_psd, inverse, low_pa
 from testbed.fusion.two_paths.loop import Loop, butterworth_loop, shaped_loop
 from testbed.fusion.two_paths.paths import parallel
 from testbed.sensors import load_preset
-from tests.contract.test_filters_on_beliefs import CASES, case
+from tests.contract.test_filters_on_beliefs import CASES, FAST, SLOW, case
 
 BELIEF = load_belief("identified")
 RATES = {"mems_gyro": 2000.0, "mhd_ars": 20_000.0}
@@ -134,15 +134,20 @@ def test_filter_keeps_the_bar_over_six_decades() -> None:
     np.testing.assert_allclose(over_bound[: low.size // 2], designed[: low.size // 2], atol=0.05)
 
 
-@pytest.mark.parametrize("one", CASES)
+PAIRS = dict.fromkeys([*CASES, *(f"exactly {fast} and {slow}" for fast in FAST for slow in SLOW)])
+
+
+@pytest.mark.parametrize("one", PAIRS)
 def test_every_shipped_pair_is_designed_within_a_second(one: str) -> None:
     belief, rates = case(one)
-    spent = []
-    for _ in range(2):
+
+    def designed() -> tuple[Complementary, float]:
         begin = time.process_time()
-        found = Complementary(belief, rates, Complementary.Parameters())
-        spent.append(time.process_time() - begin)
-    assert min(spent) < 1.0
+        return Complementary(belief, rates, Complementary.Parameters()), time.process_time() - begin
+
+    found, spent = designed()
+    # What runs for the first time in this process is not the design's cost.
+    assert spent < 1.0 or designed()[1] < 1.0
     assert found.loop.crossover > 0.0
 
 
