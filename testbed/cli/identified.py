@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from testbed.cli.console import ruled, terminal
+from testbed.errors import Problem, ScenarioError
 from testbed.units import DEG
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from testbed.identification.session import Identification
@@ -18,6 +20,32 @@ if TYPE_CHECKING:
 # Rows of the table on the terminal; all of them stand in the document and in the figure.
 _ROWS = 24
 _PPM = 1e6
+
+
+# What one channel's options say elsewhere, and only a map says of several.
+_OF_A_MAP = ("--unit", "--time-unit", "--time", "--scale", "--kind", "--rate")
+
+
+@contextmanager
+def asking_for_a_map(log: Path, *, given: bool) -> Iterator[None]:
+    """Add to what a recording's own words leave open that a map says it.
+
+    Parameters
+    ----------
+    log : Path
+        The recording.
+    given : bool
+        There is a map.
+    """
+    try:
+        yield
+    except ScenarioError as error:
+        if given or not any(one.key in _OF_A_MAP for one in error.problems):
+            raise
+        remedy = (
+            f"testbed log inspect {log} --out log.yaml writes a map, which says that of each channel: --map log.yaml"
+        )
+        raise ScenarioError([*error.problems, Problem(remedy, file=str(log))]) from error
 
 
 def print_identified(found: Sequence[Identification], figure: Path) -> None:

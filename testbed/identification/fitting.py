@@ -38,26 +38,37 @@ def fit_static(found: FrequencyResponse) -> Iterator[SensorModel]:
 
 
 def fit_dynamic(found: FrequencyResponse, n_pole: int, delay: float) -> Iterator[SensorModel]:
-    """Yield fits with so many poles, with and without a zero at s = 0 and a dead time, which is sought from one on."""
+    """Yield fits with so many poles: with and without a zero at s = 0, and without a dead time or with one, which is
+    sought from one on, beside as many other zeros as there may be or none.
+    """
     weight, shared = found.gain * np.sqrt(2.0 / found.variance), found.slope * found.clock.std
     # What is blind below the band falls towards its lower end; elsewhere a zero at s = 0 would only save a coefficient.
     may_be_blind = n_pole > 1 and bool(found.gain[0] < _FALLS * found.gain.max())
+    for blind, n_zero, start in _structures(n_pole, delay, may_be_blind=may_be_blind):
+        fit = identify(
+            found.freq_hz,
+            found.response,
+            real_poles=n_pole % 2,
+            pole_pairs=n_pole // 2,
+            blind_at_dc=blind,
+            n_zero=n_zero,
+            weight=weight,
+            shared=shared,
+            delay=start,
+            tolerance=_TOLERANCE,
+        )
+        model = _judged(found, fit.numerator, fit.denominator, fit.delay, blind=blind, delayed=start is not None)
+        if blind or not may_be_blind or _sees_constant(model):
+            yield model
+
+
+def _structures(n_pole: int, delay: float, *, may_be_blind: bool) -> Iterator[tuple[bool, int, float | None]]:
+    """Yield whether there is a zero at s = 0, the number of zeros, and where the dead time begins if there is one."""
     for blind in (False, True)[: 1 + may_be_blind]:
-        for start in (None, delay):
-            fit = identify(
-                found.freq_hz,
-                found.response,
-                real_poles=n_pole % 2,
-                pole_pairs=n_pole // 2,
-                blind_at_dc=blind,
-                weight=weight,
-                shared=shared,
-                delay=start,
-                tolerance=_TOLERANCE,
-            )
-            model = _judged(found, fit.numerator, fit.denominator, fit.delay, blind=blind, delayed=start is not None)
-            if blind or not may_be_blind or _sees_constant(model):
-                yield model
+        yield blind, n_pole - 1, None
+        # A zero far off beside a dead time and a pole leaves all three open; poles alone would take its place.
+        for n_zero in dict.fromkeys((n_pole - 1, int(blind))):
+            yield blind, n_zero, delay
 
 
 def _errors(found: FrequencyResponse) -> tuple[FloatArray, FloatArray]:

@@ -22,8 +22,8 @@ _IN_VAIN = 2
 _UNSURE = 0.1
 # And the least that it turns there to be one [rad].
 _NEGLIGIBLE = 1e-3
-# Structures that are less likely than the best one by more than a factor of 20 are not counted.
-_ALLOWED = 2.0 * np.log(20.0)
+# Structures that are less likely than the best one by more than a factor of 10 are not counted.
+_ALLOWED = 2.0 * np.log(10.0)
 _QUANTILE = 1.96
 
 
@@ -33,10 +33,11 @@ def fit_model(found: FrequencyResponse) -> SensorModel:
     .. math:: \min \sum_k |G(2 \pi i f_k) e^{-2 \pi i f_k \tau} - H_k - \delta H_{e,k}|^2 / (\sigma_k^2 / 2)
         + \delta^2 / \sigma_e^2
 
-    over none to six poles, with and without a zero at s = 0 and a dead time, by `testbed.fusion.analysis.identify`;
-    delta is the error of the clock, which turns all frequencies together. The one with the least of Bayes' criterion
-    (Schwarz 1978) is taken, its data the bins of the spectrum that the response is from. A sensor that is early or has
-    a zero on the right is held to be one in 10 000: few frequencies do not tell such a zero from a dead time.
+    over none to six poles, with and without a zero at s = 0, with and without a dead time, beside all other zeros or
+    none, by `testbed.fusion.analysis.identify`; delta is the error of the clock, which turns all frequencies together.
+    The one with the least of Bayes' criterion (Schwarz 1978) is taken, its data the bins of the spectrum that the
+    response is from. A sensor that is early or has a zero on the right is held to be one in 10 000: few frequencies do
+    not tell such a zero from a dead time.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
+from testbed.errors import Problem, ScenarioError, quoted
 from testbed.identification.channels import of_one_clock, series_of
 from testbed.identification.model import fit_model
 from testbed.identification.noise import Heard, NoiseFit, fit_noise, three_floors
@@ -108,7 +109,28 @@ def identify_sensors(
     (0.9, (1.0,))
     """
     names = [output] if isinstance(output, str) else list(output)
+    check_names(input, names)
     return identify_channels(log.channels[input], [log.channels[name] for name in names], one_clock=one_clock)
+
+
+def check_names(input: str, outputs: Sequence[str]) -> None:
+    """Raise ScenarioError if an output is the reference itself or is named twice.
+
+    Parameters
+    ----------
+    input : str
+        Channel of the reference.
+    outputs : sequence of str
+        Channels of the sensors.
+    """
+    names = [input, *outputs]
+    problems = [
+        Problem(f"expected each channel once, got {quoted(name)} {names.count(name)} times", "--output")
+        for name in dict.fromkeys(outputs)
+        if names.count(name) > 1
+    ]
+    if problems:
+        raise ScenarioError(problems)
 
 
 def identify_channels(

@@ -144,3 +144,22 @@ def test_noise_that_is_too_small_beside_the_references_is_said(tmp_path, rng):
     for sensor, std in ((quiet, 1e-6), (loud, 1e-2)):
         found = np.hypot(sensor.belief.input_noise, sensor.belief.output_noise)
         assert found == pytest.approx(std / np.sqrt(500.0), rel=0.2, abs=0.0)
+
+
+@pytest.mark.parametrize("outputs", [("laser",), ("gyro", "gyro")])
+def test_a_channel_that_is_named_twice_is_refused(tmp_path, monkeypatch, capsys, outputs):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("t [s],laser [deg/s],gyro [deg/s]\n0,1,1\n")
+    words = [word for name in outputs for word in ("--output", name)]
+    status, _, err = say("identify", "log.csv", "--input", "laser", *words, monkeypatch=monkeypatch, capsys=capsys)
+    assert status == 2
+    assert f"--output: expected each channel once, got '{outputs[0]}' 2 times" in err
+
+
+def test_what_a_recordings_words_leave_open_a_map_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("t [s],laser,gyro\n" + "".join(f"{k / 10},{k % 7},{k % 5}\n" for k in range(50)))
+    words = ("identify", "log.csv", "--input", "laser", "--output", "gyro")
+    status, _, err = say(*words, monkeypatch=monkeypatch, capsys=capsys)
+    assert status == 2
+    assert "testbed log inspect log.csv --out log.yaml writes a map" in err

@@ -37,10 +37,10 @@ def identify(
     ] = False,
 ) -> None:
     """Print the frequency response of sensors to a reference, fit it, and write what filters may believe of them."""
-    from testbed.cli.identified import identified_document, print_identified
+    from testbed.cli.identified import asking_for_a_map, identified_document, print_identified
     from testbed.identification.belief_text import belief_text
     from testbed.identification.figure import response_figure
-    from testbed.identification.session import identify_channels
+    from testbed.identification.session import check_names, identify_channels
     from testbed.judging.allan_analysis import figure_format, write_figure
     from testbed.logs.choice import select
     from testbed.logs.selection import Selection
@@ -49,8 +49,11 @@ def identify(
 
     if figure is not None:
         figure_format(figure, "--figure")
-    reference, *sensors = select(log, Selection(column=[input_, *outputs], map=map_), text)
-    found = identify_channels(reference, sensors, one_clock=one_clock)
+    check_names(input_, outputs)
+    with asking_for_a_map(log, given=map_ is not None):
+        # Means of samples have a response of their own.
+        reference, *sensors = select(log, Selection(column=[input_, *outputs], map=map_, average=1), text)
+        found = identify_channels(reference, sensors, one_clock=one_clock)
     drawn = write_figure(response_figure(found), figure or Path("runs") / f"identify_{log.resolve().stem}.svg")
     if out is not None:
         with failing_as_run_error(str(out)):

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 # The search for a shift: longest, and the largest rate [s], [-]; segments of the record [s].
 _LONGEST, _FASTEST, _SEGMENT = 0.5, 0.01, 2.0
+# The part that a long record is begun with: what is left of its rate turns the whole by a fraction of a period.
+_PART = 0.25
 # Shifts whose likelihood is this close to the best one's are told apart by their size alone.
 _TIE = 0.03
 # What the dynamics remember from before the record, in a pole beside a zero at 0.02 Hz, is below.
@@ -152,7 +154,7 @@ class Pair:
     def agreement(self) -> Agreement:
         """Return what makes the two agree: a search over all shifts, then Gauss-Newton steps."""
         middle = float(self.grid.t[self.grid.t.size // 2])
-        offset, rate, gain, ambiguity = self._searched(middle)
+        offset, rate, gain, ambiguity = self._from_a_part(middle) or self._searched(middle)
         for _ in range(_STEPS):
             found = self._fitted(self.put_right(offset, rate, middle), middle, gain)
             gain = float(found.theta[0])
@@ -242,6 +244,19 @@ class Pair:
                 worst, at = float(found), 2.0 ** (float(octave) + 0.5)
         return worst, at
 
+    def _from_a_part(self, middle: float) -> tuple[float, float, float, float] | None:
+        """Return what `_searched` does, from the beginning of a long record, of which the search does not reach all
+        rates; None of a short one, and where nothing is common. Loggers begin together.
+        """
+        if self.grid.duration <= 2.0 * _LONGEST / _FASTEST:
+            return None
+        begin = float(self.grid.t[0])
+        end = begin + _PART * self.grid.duration
+        found = Pair(*(_cut(one, begin, end) for one in (self.noisy, self.clean))).agreement()
+        if not found.common:
+            return None
+        return found.offset + found.rate * (middle - found.middle), found.rate, found.gain, found.ambiguity
+
     def _searched(self, middle: float) -> tuple[float, float, float, float]:
         """Return offset [s], rate and gain of the best shift, and the least further one that is as good [s]."""
         cross, norm, at = self._correlations(middle)
@@ -280,6 +295,12 @@ class Pair:
         cross = np.roll(irfft(A * C.conj() * weight, n, axis=1), lags, axis=1)[:, : 2 * lags + 1] / overlap
         norm = float(np.sum(irfft(np.abs(C) ** 2 * weight, n, axis=1)[:, 0]))
         return cross, norm, self.grid.t[begins] + 0.5 * n / fs - middle
+
+
+def _cut(trace: Trace, begin: float, end: float) -> Trace:
+    """Return what a trace has between two times [s]."""
+    kept = slice(*np.searchsorted(trace.t, (begin, end)))
+    return replace(trace, t=trace.t[kept], z=trace.z[kept])
 
 
 def _next_peak(high: NDArray[np.bool_], chosen: int) -> float:

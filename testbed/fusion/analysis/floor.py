@@ -68,6 +68,8 @@ def own_noise(trace: Trace) -> NoiseRatio | None:
         Readings and belief.
     """
     good = np.isfinite(trace.z)
+    if not good.any():
+        return None
     z = trace.z if good.all() else np.interp(trace.t, trace.t[good], trace.z[good])
     fs = 1.0 / trace.interval
     n = _segment(z.size, fs)

@@ -122,6 +122,7 @@ def identify(
     real_poles: int,
     pole_pairs: int = 0,
     blind_at_dc: bool = False,
+    n_zero: int | None = None,
     weight: FloatArray | None = None,
     shared: ComplexArray | None = None,
     delay: float | None = None,
@@ -145,6 +146,8 @@ def identify(
         Number of real poles and of complex pairs, at least one pole in all.
     blind_at_dc : bool, optional
         Force G(0) = 0, as for an MHD sensor.
+    n_zero : int, optional
+        Degree of N, that zero included; default one less than there are poles.
     weight : ndarray, shape (n_freq,), optional
         Weight w of each sample [-]; default 1: relative errors count alike.
     shared : ndarray of complex, shape (n_freq,), optional
@@ -164,7 +167,7 @@ def identify(
     Raises
     ------
     ValueError
-        If there are fewer samples than coefficients, or a sample is zero or not finite.
+        If there are fewer samples than coefficients, N has no such degree, or a sample is zero or not finite.
     """
     from scipy.optimize import least_squares
 
@@ -184,6 +187,10 @@ def identify(
     unit = 2.0 * np.pi * np.sqrt(freq[0] * freq[-1])
     s = 2j * np.pi * freq / unit
 
+    degrees = int(blind_at_dc), n_pole - 1 if n_zero is None else n_zero
+    if n_zero is not None and not degrees[0] <= n_zero < n_pole:
+        msg = f"n_zero: expected {degrees[0]} to {n_pole - 1}, got {degrees[1]}"
+        raise ValueError(msg)
     lowest, highest = _reach(np.abs(s), real_poles, pole_pairs)
     n_place, late = real_poles + 2 * pole_pairs, [] if delay is None else [delay * unit]
 
@@ -195,7 +202,7 @@ def identify(
 
     def residual(place: FloatArray) -> FloatArray:
         wanted = in_time(place)
-        fit = _fitted(s, wanted, w, common, denominator(place), blind_at_dc)[1]
+        fit = _fitted(s, wanted, w, common, denominator(place), degrees)[1]
         return whitened(parts(w * (fit / wanted - 1.0)), common)
 
     tried = []
@@ -209,10 +216,10 @@ def identify(
             break
     place = min(tried, key=lambda one: float(one.cost)).x
     D, wanted = denominator(place), in_time(place)
-    N, G = _fitted(s, wanted, w, common, D, blind_at_dc)
+    N, G = _fitted(s, wanted, w, common, D, degrees)
     powers = unit ** np.arange(n_pole + 1.0)
     found = 0.0 if delay is None else float(place[-1]) / unit
-    return Identified(N * powers[1:], D * powers, float(np.max(np.abs(G / wanted - 1.0))), found)
+    return Identified(N * powers[-N.size :], D * powers, float(np.max(np.abs(G / wanted - 1.0))), found)
 
 
 def _reach(freq: FloatArray, real_poles: int, pole_pairs: int) -> tuple[FloatArray, FloatArray]:
@@ -244,12 +251,11 @@ def _denominator(place: FloatArray, real_poles: int) -> FloatArray:
 
 
 def _fitted(
-    s: ComplexArray, H: ComplexArray, w: FloatArray, common: FloatArray, D: FloatArray, blind_at_dc: bool
+    s: ComplexArray, H: ComplexArray, w: FloatArray, common: FloatArray, D: FloatArray, degrees: tuple[int, int]
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return the best N for the poles of D (highest power first, degree one below D's) and G = N/D."""
-    n = D.size - 1
-    lowest = 1 if blind_at_dc else 0
-    basis = s[:, None] ** np.arange(n - 1, lowest - 1, -1) / np.polyval(D, s)[:, None]
+    """Return the best N, of such lowest and highest degree, for the poles of D (highest power first) and G = N/D."""
+    lowest, highest = degrees
+    basis = s[:, None] ** np.arange(highest, lowest - 1, -1) / np.polyval(D, s)[:, None]
     system = whitened(parts((w / H)[:, None] * basis), common)
     wanted = whitened(np.concatenate([w, np.zeros_like(w)]), common)
     size = np.linalg.norm(system, axis=0)

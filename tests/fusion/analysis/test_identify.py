@@ -57,6 +57,16 @@ def test_no_zero_is_made_of_rounding() -> None:
     np.testing.assert_array_equal(identify(FREQ, H, real_poles=0, pole_pairs=1).numerator[:-1], 0.0)
 
 
+def test_a_numerator_of_a_lower_degree_may_be_asked_for() -> None:
+    w = 2.0 * np.pi * np.array([3.0, 480.0])
+    H = transfer(np.array([w.prod()]), np.array([1.0, w.sum(), w.prod()]), FREQ)
+    fit = identify(FREQ, H, real_poles=2, n_zero=0)
+    np.testing.assert_allclose(fit.numerator, [w.prod()], rtol=1e-9)
+    np.testing.assert_allclose(fit.denominator, [1.0, w.sum(), w.prod()], rtol=1e-9)
+    with pytest.raises(ValueError, match="n_zero: expected 1 to 1, got 0"):
+        identify(FREQ, H, real_poles=2, blind_at_dc=True, n_zero=0)
+
+
 def test_weight_decides_where_the_fit_is_good() -> None:
     """Two poles cannot carry three; weighting the upper half makes the upper half better and the lower worse."""
     w = 2.0 * np.pi * np.array([1.0, 20.0, 300.0])

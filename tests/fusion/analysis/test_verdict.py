@@ -169,6 +169,29 @@ def test_what_is_cut_off_at_the_end_of_the_range_is_neither_noise_nor_stuck():
     assert not {("repeats", "mhd_ars"), ("belief", "mhd_ars")} & set(kinds(found))
 
 
+def test_a_sensor_that_always_reads_the_same_is_stuck_and_no_more(moving):
+    """Alone, so that its noise is looked for in what is not stuck."""
+    readings, time_ns = moving
+    found = verdict({"mems_gyro": np.zeros(readings["mems_gyro"].size)}, {"mems_gyro": time_ns["mems_gyro"]}, EQ39)
+    assert kinds(found) == [("repeats", "mems_gyro")]
+
+
+def test_clocks_that_drift_apart_by_more_than_the_search_reaches_are_told(rng):
+    """3000 ppm over 400 s: 0.6 s at either end; half a second is searched."""
+    like = {"numerator": [300.0], "denominator": [1.0, 300.0]}
+    belief = load_belief({"good": like | {"output_noise": 1e-5}, "late": like | {"output_noise": 1e-4}})
+    t = np.arange(40_000) / 100.0
+    readings = {}
+    for name, run, std in (("good", 0.0, 1e-4), ("late", 3e-3, 1e-3)):
+        true = (1.0 - run) * t
+        lines = sum(0.02 * np.sin(2.0 * np.pi * f * true + f) for f in (0.71, 3.3, 11.7))
+        readings[name] = lines + std * rng.standard_normal(t.size)
+    stamps = np.rint(1e9 * t).astype(np.int64)
+    found = verdict(readings, {"good": stamps, "late": stamps}, belief)
+    assert kinds(found) == [("rate", "late")]
+    assert found.findings[0].value == pytest.approx(3e-3, rel=0.0, abs=20e-6)
+
+
 def test_sensors_that_were_swapped_are_told(moving):
     readings, time_ns = moving
     names = {"mhd_ars": "mems_gyro", "mems_gyro": "mhd_ars"}
