@@ -27,8 +27,8 @@ LONG = {
     "testbed compensate audit paper3 unseen --out audit_paper": "tests/reproduce/test_paper3.py audits it",
     "testbed design examples/satellite_link_design.yaml --prove": "tests/design/test_design.py proves with two seeds",
 }
-# What the snippets for clusters need; without it they are compiled only.
-NOT_INSTALLED = ("dask_jobqueue", "dask_kubernetes")
+# What needs a cluster is compiled only; test_blocks.py asks a scheduler of its own for the jobs where it can.
+ON_A_CLUSTER = ("dask_jobqueue", "dask_kubernetes")
 
 # What pages say of what their Python prints: the words that print it, and the sentence that then has to be there.
 SAID: dict[str, dict[str, Callable[..., str]]] = {

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -44,6 +47,20 @@ def test_no_code_is_hidden_in_an_indent(page):
     """A paragraph that begins with four blanks is shown as code too, and nobody would try it."""
     outside = FENCE.sub("", page.read_text(encoding="utf-8"))
     assert re.findall(r"\n\n( {4}[a-z].*)", outside) == []
+
+
+@pytest.mark.slow
+def test_the_snippet_for_slurm_asks_for_its_jobs(tmp_path, monkeypatch):
+    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is not installed: the snippet is compiled only")
+    for name, does in (("sbatch", f'cat "$1" > {tmp_path}/job.$$; echo "Submitted batch job $$"'), ("scancel", "true")):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{does}\n", encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    (text,) = (text for _, text in blocks(ROOT / "docs" / "campaigns.md") if "SLURMCluster" in text)
+    program = f"{text}\nimport time\ntime.sleep(5)\ncluster.close()\n"
+    path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, "PATH": path}, check=True, timeout=60)
+    assert len(list(tmp_path.glob("job.*"))) == 100
+    assert "-t 08:00:00" in next(tmp_path.glob("job.*")).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

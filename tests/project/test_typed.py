@@ -45,7 +45,9 @@ def strange(line):
     if name is None:
         # A group of commands, or an option of all.
         return [] if any(one.startswith(" ".join(words[:2]) + " ") for one in COMMANDS) or asked else [line]
-    return sorted(asked - set(options(COMMANDS[name])) - {"--help"})
+    kept = [word for word in words if word.startswith(("scenarios/", "studies/", "examples/"))]
+    missing = [word for word in kept if not (ROOT / word).exists()]
+    return sorted(asked - set(options(COMMANDS[name])) - {"--help"}) + missing
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
@@ -57,5 +59,6 @@ def test_every_command_and_option_that_a_page_shows_is_there(page):
 def test_a_strange_word_is_found():
     assert strange("testbed run a.yaml --outt b") == ["--outt"]
     assert strange("testbed rum a.yaml") == ["testbed rum a.yaml"]
+    assert strange("testbed run scenarios/no_such.yaml") == ["scenarios/no_such.yaml"]
     assert strange("python examples/no_such.py") == ["examples/no_such.py"]
     assert strange('testbed run "a b.yaml" --out b --json | python -c "print(1)"  # --x') == []
