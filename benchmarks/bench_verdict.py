@@ -108,6 +108,13 @@ def faults(seeds):
             for one in records(table(lines, 20.0, gyro="adis16505"), seeds)
         )
         yield f"wide gyro, {label}", hits, hits, hits
+    others = records(table(((9.0, 0.1),), 20.0), seeds)
+    for label, lines in (("mixed", MIXED), ("4 Hz", FOUR)):
+        hits = 0
+        for (readings, stamps), (other, _) in zip(records(table(lines, 20.0), seeds), others, strict=True):
+            found = verdict(readings | {"mems_gyro": other["mems_gyro"]}, stamps, eq39)
+            hits += [one.kind for one in found.findings] == ["axis"]
+        yield f"another axis, {label}", hits, hits, hits
 
 
 def main() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from testbed.campaigns.many import ManyFilters, ManySensors
@@ -16,7 +15,7 @@ from testbed.judging.judge import Judge
 from testbed.runs.block import RunBlock
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from testbed.fusion.base import EstimateBlock, Received
     from testbed.runs.metrics import RunMetrics
@@ -55,6 +54,14 @@ class Lockstep:
             (name, [i for i, made in enumerate(self._estimates) if made.get(name) == number])
             for number, ((name, *_), _) in enumerate(self._filters)
         ]
+        # Filters that receive the same come one after the other, so that it is there once, and no longer than for them.
+        fronts: dict[Any, list[int]] = {}
+        for number in sorted(range(len(self._filters)), key=lambda number: not self._filters[number][1].in_lanes):
+            fronts.setdefault(self._front(number), []).append(number)
+        self._order = [number for numbers in fronts.values() for number in numbers]
+        # Lanes go fastest where their buffers stay; others are slow enough to have the room instead, unless what stands
+        # in them is for further seeds of this block.
+        self._makes_room = len(seeds) <= _PACK and not all(stage.in_lanes for _, stage in self._filters)
         rates = [sample_rates(case) for case in cases]
         self._common = [CaseFacts(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
         self._sights = {
@@ -102,7 +109,8 @@ class Lockstep:
 
     def _judge(self, block: RunBlock, pack: Sequence[int]) -> None:
         """Judge some seeds: their readings, then one filter after the other, then what all of them leave of the line
-        of sight. No more than the estimates of one filter are there at a time.
+        of sight. No more than the estimates of one filter are there at a time, of a filter without lanes those of one
+        seed.
         """
         readings = [sensor.readings(pack) for _, sensor in self._sensors]
         sensed = {
@@ -114,16 +122,30 @@ class Lockstep:
             self._judges[key].write(replace(block, sensors=given))
         rates: dict[tuple[int, int], dict[str, FloatArray]] = {key: {} for key in sensed}
         known: dict[Any, list[Received]] = {}
-        for number, (name, users) in enumerate(self._users):
+        for number in self._order:
             estimates = self._estimated(number, readings, pack, known)
-            for i, (seed, estimate) in product(users, zip(pack, estimates, strict=True)):
-                self._judges[i, seed].write(replace(block, fusion={name: estimate}))
-                if name in self._sights[i, seed].names:
-                    rates[i, seed][name] = estimate.rate.copy()  # it holds until the next filter works
+            for seed in pack:
+                self._take(block, number, seed, next(estimates), rates)
+            del estimates  # with what is received, before the next filter receives something else
         for key, given in sensed.items():
             truth = block.truth
             sight = self._sights[key].process(truth.rate, truth.sensor_rate, given, rates[key])
             self._judges[key].write(replace(block, pointing=sight))
+
+    def _take(
+        self,
+        block: RunBlock,
+        number: int,
+        seed: int,
+        estimate: EstimateBlock,
+        rates: Mapping[tuple[int, int], dict[str, FloatArray]],
+    ) -> None:
+        """Judge an estimate in each case that has it; nobody else holds it, so that it is gone before the next one."""
+        name, users = self._users[number]
+        for i in users:
+            self._judges[i, seed].write(replace(block, fusion={name: estimate}))
+            if name in self._sights[i, seed].names:
+                rates[i, seed][name] = estimate.rate.copy()  # it holds until the next filter works
 
     def _estimated(
         self,
@@ -131,18 +153,26 @@ class Lockstep:
         readings: Sequence[list[FloatArray]],
         pack: Sequence[int],
         known: dict[Any, list[Received]],
-    ) -> list[EstimateBlock]:
-        """Return the estimates of a filter; those that receive the same of the same readings do so once, and it is
-        `known` from then on.
+    ) -> Iterator[EstimateBlock]:
+        """Yield the estimates of a filter; those that receive the same of the same readings do so once, and it is
+        `known` until others receive something else.
         """
         (_, _, reads, _), stage = self._filters[number]
         given = {name: readings[i] for name, i in reads.items()}
+        if self._makes_room:
+            self._buffers.clear()
         if stage.front is None:
             return stage.process(given, pack)
-        key = (stage.front, *reads.items())
+        key = self._front(number)
         if key not in known:
+            known.clear()
             known[key] = stage.received(given, pack)
         return stage.process(given, pack, known[key])
+
+    def _front(self, number: int) -> Any:
+        """Return what a filter receives, in a form that is equal where that is the same."""
+        (_, _, reads, _), stage = self._filters[number]
+        return number if stage.front is None else (stage.in_lanes, stage.front, *reads.items())
 
     def foresee(self) -> None:
         """Work out ahead what the metrics of all seeds share and no signal is needed for."""

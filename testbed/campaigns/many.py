@@ -14,7 +14,7 @@ from testbed.sensors.checked import CheckedSensor
 from testbed.sensors.stages import ExposedStage, SplitStage, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from testbed.fusion.base import EstimateBlock, Received
     from testbed.fusion.lanes.pack import Buffers
@@ -105,12 +105,14 @@ class ManyFilters:
         self._shipped = spec.type in FILTERS
         # Filters with an equal one receive the same of equal readings; None has what nobody else has.
         self.front: Any = None
+        self.in_lanes = False
         if self._shipped:
             rates = {sensor: part.sample_rate for sensor, part in scenario.sensors.items()}
             first = spec.start(rates)
             # Some design their gains before they start.
             self._stages = {seed: deepcopy(first) for seed in seeds}
             self._together = Together(first, buffers)
+            self.in_lanes = self._together.in_lanes
             self._onsets = {seed: Onset(scenario) for seed in seeds if scenario.frame.fusion_from}
             self.front = None if self._onsets else first.front()
         else:
@@ -126,9 +128,10 @@ class ManyFilters:
         readings: Mapping[str, Sequence[FloatArray]],
         seeds: Sequence[int],
         received: Sequence[Received] | None = None,
-    ) -> list[EstimateBlock]:
-        """Return the estimates over a block under some of the seeds; of the diagnostics at least innovations, their
-        variances and counts of the gate. They hold until the next call of any that shares the buffers.
+    ) -> Iterator[EstimateBlock]:
+        """Yield the estimates over a block under some of the seeds; of the diagnostics at least innovations, their
+        variances and counts of the gate. They hold until the next call of any that shares the buffers, and all of them
+        are to be taken.
 
         Parameters
         ----------
@@ -147,19 +150,19 @@ class ManyFilters:
             return self._late(stages, given, seeds)
         if self._shipped:
             return self._together.process(stages, self.received(readings, seeds))
-        return [stage.process(values) for stage, values in zip(stages, given, strict=True)]
+        return (stage.process(values) for stage, values in zip(stages, given, strict=True))
 
     def _late(
         self, stages: Sequence[Any], given: Sequence[Mapping[str, FloatArray]], seeds: Sequence[int]
-    ) -> list[EstimateBlock]:
-        """Return the estimates where the filters do not see all readings of the run."""
+    ) -> Iterator[EstimateBlock]:
+        """Yield the estimates where the filters do not see all readings of the run."""
         parts = [self._onsets[seed].divide(values) for seed, values in zip(seeds, given, strict=True)]
         unseen, seen = parts[0]
         blank = [stages[0].blank(longest(unseen))] if longest(unseen) else []
         if blank and not longest(seen):
-            return blank * len(seeds)
+            return iter(blank * len(seeds))
         received = [stage.received(values) for stage, (_, values) in zip(stages, parts, strict=True)]
-        return [joined([*blank, one]) for one in self._together.process(stages, received)]
+        return (joined([*blank, one]) for one in self._together.process(stages, received))
 
 
 def _by_seed(readings: Mapping[str, Sequence[FloatArray]], seeds: Sequence[int]) -> list[dict[str, FloatArray]]:

@@ -133,7 +133,11 @@ def sweep_words(size: Size) -> str:
     """
     room = f"{size.memory_bytes / 1e6:.0f} MB of memory, {size.disk_bytes / 1e6:.3g} MB of disk"
     spent = f"{_time(size.cpu_seconds)} of processor time in {_time(size.seconds)}"
-    return f"{size.cases} cases, at most {size.runs} runs, about {spent}, {room}"
+    return f"{_number(size.cases, 'case')}, at most {_number(size.runs, 'run')}, about {spent}, {room}"
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _time(seconds: float) -> str:

@@ -47,7 +47,7 @@ class CaseStore:
         self._folder, self._schema = folder, schema
         self._waiting: list[dict[str, Any]] = []
         self._written, self._parts = 0.0, 0
-        _refuse_others(folder, study)
+        refuse_others(folder, study)
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = _locked(folder)
         (folder / CASES).mkdir(exist_ok=True)
@@ -149,7 +149,21 @@ def _write_part(path: Path, table: pa.Table) -> None:
     write_bytes(path, content.getvalue())
 
 
-def _refuse_others(folder: Path, study: Mapping[str, Any]) -> None:
+def refuse_others(folder: Path, study: Mapping[str, Any]) -> None:
+    """Refuse a folder of another study, or of something else.
+
+    Parameters
+    ----------
+    folder : Path
+        Where a sweep is to go.
+    study : mapping
+        What it is (`Study.document`).
+
+    Raises
+    ------
+    ScenarioError
+        If the folder holds another study, with the difference, or something else.
+    """
     if folder.exists() and not folder.is_dir():
         raise ScenarioError([Problem("exists and is no folder: choose another --out", file=str(folder))])
     if not folder.exists() or not any(folder.iterdir()):

@@ -106,7 +106,7 @@ def sweep(
     loaded = study if isinstance(study, Study) else load_study(study)
     if workers < 1:
         raise ScenarioError([Problem(f"expected at least 1, got {workers}", "workers")])
-    folder = Path("runs") / loaded.name if out is None else Path(out)
+    folder = folder_of(loaded, out)
     with CaseStore(folder, loaded.document(), schema_of(loaded)) as store:
         agenda = Agenda(loaded, store.done, *(_known(folder) if loaded.precision is not None else ()))
         told, page = Progress(agenda.runs, len(store.done)), Page(folder, loaded)
@@ -122,9 +122,25 @@ def sweep(
             play_here(agenda, take)
         else:
             play_on_cluster(agenda, take, workers=0 if scheduler else workers, scheduler=scheduler)
+        if progress is not None and told.done < told.runs:
+            told.runs = told.done  # no error needs further seeds
+            progress(told)
         store.compact()
         page.write()
     return folder
+
+
+def folder_of(study: Study, out: str | Path | None) -> Path:
+    """Return the folder of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Which.
+    out : str, Path or None
+        As `sweep` takes it.
+    """
+    return Path("runs") / study.name if out is None else Path(out)
 
 
 def open_sweep(folder: str | Path) -> pa.Table:

@@ -10,12 +10,13 @@ from testbed.cli.progress import sweeping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from testbed.campaigns.study import Study
     from testbed.cli.options import Output
 
 
-def tell_size(study: Study, workers: int, output: Output) -> None:
+def tell_size(study: Study, workers: int, output: Output, folder: Path) -> None:
     """Say how many cases and runs there are, and what they take.
 
     Parameters
@@ -26,7 +27,17 @@ def tell_size(study: Study, workers: int, output: Output) -> None:
         Processes.
     output : Output
         Where the words go; nothing is tried out where nobody reads them.
+    folder : Path
+        Where it will go.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder holds something else: not after what it takes has been tried out.
     """
+    from testbed.campaigns.store import refuse_others
+
+    refuse_others(folder, study.document())
     if output.quiet:
         return
     from testbed.campaigns.size import size_of, sweep_words

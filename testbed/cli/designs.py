@@ -52,7 +52,7 @@ def prove(
     from testbed.design.proof import proof_study, read_proof
 
     study, place = proof_study(requirement, candidate, seeds, folder, list(plugins)), folder / "proof"
-    tell_size(study, workers, output)
+    tell_size(study, workers, output, place)
     with playing(study.name, output) as told:
         sweep(study, workers=workers, out=place, **told)
     return read_proof(requirement, candidate, place)

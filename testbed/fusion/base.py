@@ -269,7 +269,8 @@ class BlockFilter:
             As for `process`.
         """
         Z, timing = self._spread(readings, time_ns)
-        gated = np.zeros_like(Z) if self._gate is None else self._gate.process(Z)
+        # Of zeros that nobody writes to there is one page, where those of `zeros_like` are all there.
+        gated = np.zeros(Z.shape) if self._gate is None else self._gate.process(Z)
         # Only now: range and repetitions are those of the readings as they come.
         if self._bias.any():
             Z -= self._bias

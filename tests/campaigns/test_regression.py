@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -24,6 +25,7 @@ from testbed.campaigns.sweep import sweep
 from testbed.cli.app import app
 from testbed.errors import ScenarioError
 from testbed.fusion import FILTERS
+from tests.campaigns.test_size import SAID
 from tests.campaigns.test_study import written
 from tests.examples.programs import EXAMPLES
 
@@ -247,15 +249,21 @@ def test_a_sweep_of_somebody_is_refused_and_stays(tiny, tmp_path):
     assert testbed.open_sweep(folder).equals(before)
 
 
-def test_the_command_says_what_moved_by_its_status(tiny, tmp_path, monkeypatch):
+def test_the_command_says_what_it_takes_and_what_moved_by_its_status(tiny, tmp_path, monkeypatch):
     history = tmp_path / "history.parquet"
     monkeypatch.setattr(
         "testbed.campaigns.regression.regress.run_regression",
         lambda entry, **options: run_regression(entry, **options, history=history),
     )
     command = ["regress", "--short", "--json", "--quiet", "--out", str(tmp_path / "out")]
-    assert CliRunner().invoke(app, [*command, "--update", "First."]).exit_code == 0
+    first = CliRunner().invoke(app, [*(word for word in command if word != "--quiet"), "--update", "First."])
+    assert first.exit_code == 0
+    said = re.search(SAID, first.stderr)
+    assert said is not None
+    assert said.groups() == ("1", "2")
+    assert said.end() < first.stderr.index("2 of 2 runs")
     done = CliRunner().invoke(app, command)
+    assert done.stderr == ""
     assert done.exit_code == 0
     document = json.loads(done.stdout)
     assert {one["name"] for one in document["standings"]} == {"kalman", "complementary"}

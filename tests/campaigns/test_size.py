@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 from testbed.campaigns.size import Size, size_of, sweep_words, warm
 from testbed.campaigns.study import load_study
 from testbed.cli.app import app
+from testbed.cli.designs import prove
+from testbed.cli.options import Output
 from testbed.fusion.checked import CheckedFilter
 from tests.campaigns.test_study import written
 
@@ -39,7 +41,7 @@ disk = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
 memory = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 print(json.dumps([[told.cpu_seconds, cpu], [told.memory_bytes, memory], [told.disk_bytes, disk]]))
 """
-SAID = r"(\d+) cases, at most (\d+) runs, about \d+ s of processor time in \d+ s, \d+ MB of memory, [\d.]+ MB of disk"
+SAID = r"(\d+) cases?, at most (\d+) runs?, about \d+ s of processor time in \d+ s, \d+ MB of memory, [\d.]+ MB of disk"
 
 
 @pytest.mark.slow
@@ -80,6 +82,7 @@ def test_the_words_have_all_of_it():
     said = sweep_words(Size(3, 30, 40.0, 20.0, 300_000_000, 250_000))
     assert said == ("3 cases, at most 30 runs, about 40 s of processor time in 20 s, 300 MB of memory, 0.25 MB of disk")
     assert "about 20 min of processor time in 10 min" in sweep_words(Size(3, 30, 1200.0, 600.0, 1, 1))
+    assert sweep_words(Size(1, 1, 1.0, 1.0, 1, 1)).startswith("1 case, at most 1 run, about 1 s")
 
 
 def test_sweep_says_it_before_it_begins(tmp_path):
@@ -90,3 +93,15 @@ def test_sweep_says_it_before_it_begins(tmp_path):
     assert said is not None
     assert said.groups() == ("2", "4")
     assert spoken.stderr.index("cases, at most") < spoken.stderr.index("runs, best")
+
+
+def test_what_a_proof_takes_is_told_before_it_begins(tmp_path, monkeypatch, capsys):
+    """`testbed design --prove` is a sweep of the chosen chain: one case."""
+    study = load_study(written(tmp_path, "seeds: 2\n"))
+    monkeypatch.setattr("testbed.design.proof.proof_study", lambda *_: study)
+    monkeypatch.setattr("testbed.design.proof.read_proof", lambda *_: {})
+    monkeypatch.setattr("testbed.campaigns.sweep.sweep", lambda *_, **__: print("began", file=sys.stderr))
+    prove(None, None, tmp_path, seeds=2, workers=1, plugins=(), output=Output())
+    said = re.search(f"{SAID}\nbegan", capsys.readouterr().err)
+    assert said is not None
+    assert said.groups() == ("1", "2")

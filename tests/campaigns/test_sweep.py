@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from distributed import KilledWorker
+from typer.testing import CliRunner
 
 import testbed
 from testbed.campaigns.agenda import CHUNK, Agenda, play
@@ -20,6 +21,7 @@ from testbed.campaigns.size import warm
 from testbed.campaigns.store import CASES, CaseStore, read_cases
 from testbed.campaigns.study import load_study
 from testbed.campaigns.sweep import open_sweep, sweep
+from testbed.cli.app import app
 from testbed.errors import RunError, ScenarioError
 from tests.campaigns.test_study import written
 
@@ -111,6 +113,23 @@ def test_a_study_that_has_changed_is_refused_with_the_difference(done, tmp_path)
     with pytest.raises(ScenarioError, match="its base has changed"):
         sweep(load_study(tmp_path / "study.yaml"), out=folder)
     assert read_cases(folder).num_rows == 24
+
+
+def test_the_command_refuses_before_it_tries_out_what_it_takes(done, tmp_path, monkeypatch):
+    _, folder = done
+    monkeypatch.setattr("testbed.campaigns.size.size_of", None)
+    path = written(tmp_path, "vary: {motion.0.sine.frequency: [5 Hz]}\nseeds: 3\n")
+    refused = CliRunner().invoke(app, ["sweep", str(path), "--out", str(folder)])
+    assert isinstance(refused.exception, ScenarioError)
+    assert "it had 2 cases and has 1" in str(refused.exception)
+    assert refused.stderr == ""
+
+
+def test_where_a_precision_is_reached_early_the_last_word_is_that_all_is_done(tmp_path):
+    study = load_study(written(tmp_path, "seeds: {until: {rmse: 90 %}, most: 30}\n"))
+    told = []
+    sweep(study, out=tmp_path / "out", progress=lambda one: told.append((one.done, one.runs)))
+    assert told == [(CHUNK, 30), (CHUNK, CHUNK)]
 
 
 def test_a_folder_of_something_else_or_in_use_is_refused(done, tmp_path):

@@ -48,7 +48,7 @@ def run_regression(
     update: str | None = None,
     workers: int = 1,
     out: str | Path | None = None,
-    begin: Callable[[Study], None] | None = None,
+    begin: Callable[[Study, Path], None] | None = None,
     progress: Callable[[Progress], None] | None = None,
     history: Path = HISTORY,
 ) -> Outcome:
@@ -69,7 +69,7 @@ def run_regression(
     out : str or Path, optional
         Folder; ``runs/regress_standard`` or ``runs/regress_short``, with the names of an entry, if not given.
     begin : callable, optional
-        Gets what will be played, before any of it is.
+        Gets what will be played, and its folder, before any of it is.
     progress : callable, optional
         As for `testbed.sweep`.
     history : Path, optional
@@ -92,7 +92,7 @@ def run_regression(
     target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
     make_way(target, study, plugins)
     if begin is not None:
-        begin(study)
+        begin(study, target)
     folder = sweep(study, workers=workers, out=target, progress=progress)
     table = read_cases(folder).to_pylist()
     rows, failures = essence(table), [row for row in table if row["status"] != OK]

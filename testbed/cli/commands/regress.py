@@ -51,7 +51,9 @@ def regress(
 
     options: dict[str, Any] = {"short": short, "update": update, "workers": workers, "out": out}
     with playing("regress", output) as told:
-        found = run_regression(entry, **options, **told, begin=lambda study: tell_size(study, workers, output))
+        found = run_regression(
+            entry, **options, **told, begin=lambda study, folder: tell_size(study, workers, output, folder)
+        )
     document = _document(found)
     output.show(document, lambda: _print(found))
     if found.failures:

@@ -40,12 +40,14 @@ def sweep(
         number, seed = which(only, len(loaded.cases), loaded.seeds[0])
         repeat(loaded.name, loaded.cases[number], seed, out, output)
         return
+    from testbed.campaigns.sweep import folder_of
     from testbed.campaigns.sweep import sweep as play
     from testbed.cli.campaign import playing, tell_size
 
-    tell_size(loaded, workers, output)
+    folder = folder_of(loaded, out)
+    tell_size(loaded, workers, output, folder)
     with playing(loaded.name, output) as told:
-        folder = play(loaded, workers=workers, scheduler=scheduler, out=out, **told)
+        play(loaded, workers=workers, scheduler=scheduler, out=folder, **told)
     document = _document(folder, loaded)
     output.show(document, lambda: _print(document))
     if document["failures"]:

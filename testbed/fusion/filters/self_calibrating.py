@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from testbed.parts import Part
     from testbed.signals import FloatArray
 
+    Held = tuple[FloatArray, ...]
+
 # What goes on with another belief from the state that it has, and the attributes that are that state.
 _INNER = {
     "kalman": ("testbed.fusion.filters.kalman:Kalman", ("_x", "_P", "_started")),
@@ -174,7 +176,7 @@ class SelfCalibrating(BlockFilter):
         self._second = np.full((2, round(slow_hz) * self._stride), math.nan)
         self._filled = 0
         # Of the last seconds the readings, and the state before them.
-        self._past: deque[tuple[dict[str, Any], FloatArray]] = deque(maxlen=_AGAIN)
+        self._past: deque[tuple[dict[str, Any], Held]] = deque(maxlen=_AGAIN)
 
     @property
     def model(self) -> FusionModel:
@@ -190,14 +192,14 @@ class SelfCalibrating(BlockFilter):
         n, at = Z.shape[1], 0
         while at < n:
             if self._filled == 0:
-                self._past.append((self._state(), np.empty(0)))
+                self._past.append((self._state(), ()))
             part = slice(at, min(n, at + self._second.shape[1] - self._filled))
             length = part.stop - part.start
             self._second[:, self._filled : self._filled + length] = Z[:, part]
             self._filled, at = self._filled + length, part.stop
             self._estimate(Z[:, part], out[:, part])
             if self._filled == self._second.shape[1]:
-                self._past[-1] = self._past[-1][0], self._second.copy()
+                self._past[-1] = self._past[-1][0], self._held()
                 self._learn()
                 self._filled = 0
 
@@ -242,9 +244,20 @@ class SelfCalibrating(BlockFilter):
         for name, value in past[0][0].items():
             setattr(self._inner, name, value)
         self._past.clear()
-        for _, Z in past:
-            self._past.append((self._state(), Z))
-            self._filtered(Z)
+        for _, held in past:
+            self._past.append((self._state(), held))
+            self._filtered(self._laid(held))
+
+    def _held(self) -> Held:
+        """Return the readings of the second, of each sensor those that are due: the rest is empty."""
+        return tuple(z[::stride].copy() for z, stride in zip(self._second, self.schedule.strides, strict=True))
+
+    def _laid(self, held: Held) -> FloatArray:
+        """Return the second of which these readings were."""
+        Z = np.full_like(self._second, math.nan)
+        for z, readings, stride in zip(Z, held, self.schedule.strides, strict=True):
+            z[::stride] = readings
+        return Z
 
     def _state(self) -> dict[str, Any]:
         return {name: copy(getattr(self._inner, name)) for name in _INNER[self._name][1]}

@@ -58,12 +58,14 @@ def codes_of(due: Any) -> list[int]:
 class Buffers:
     """Arrays of a block, used again in the next one and by all filters that share them; NaN where nothing was written.
 
-    What one filter leaves in them holds until the next one works, of the same block or of the next.
+    What one filter leaves in them holds until the next one works, of the same block or of the next. Beside them stands
+    what is `kept` for the same filters under further seeds.
     """
 
     def __init__(self) -> None:
         self._due = np.zeros((0, 0), dtype=np.bool_)
         self._arrays: dict[tuple[str, int], FloatArray] = {}
+        self.kept: dict[Any, Any] = {}
 
     def of(self, due: Any, number: int, lanes: int, names: Mapping[str, bool]) -> dict[str, FloatArray]:
         """Return the arrays of a pack, shape (lanes, n_time) or (lanes, n_sensor, n_time).
@@ -83,6 +85,10 @@ class Buffers:
             self._due, self._arrays = due.copy(), {}
         shapes = {name: due.shape if many else due.shape[1:] for name, many in names.items()}
         return {name: self._one((name, number), lanes, shape) for name, shape in shapes.items()}
+
+    def clear(self) -> None:
+        """Let all of it go, where what comes next needs room and no lanes."""
+        self._arrays, self.kept = {}, {}
 
     def _one(self, key: tuple[str, int], lanes: int, shape: tuple[int, ...]) -> FloatArray:
         known = self._arrays.get(key)

@@ -49,7 +49,6 @@ class SharedLanes:
         self._run = module_of(source).run
         self._gains_of = gains_kernel(len(example._x), len(self._model.H), self._model.n_slow)
         self._buffers = buffers
-        self._gains: KalmanGains | SettlingGains | None = None
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
         """Advance those filters of `whole` that have the same past, and return their estimates by number.
@@ -77,10 +76,12 @@ class SharedLanes:
 
     def _gains_for(self, first: Any, due: Any) -> KalmanGains | SettlingGains:
         """Return the covariance over the block, which other filters may have asked for already."""
-        if self._gains is None or not (np.array_equal(due, self._gains.due) and self._gains.hold(first)):
-            self._gains = self._kind(first, due, self._gains_of)
-            self._gains.usable &= self._together.issuperset(codes_of(due))
-        return self._gains
+        kept: dict[Any, KalmanGains | SettlingGains] = self._buffers.kept
+        if self not in kept or not (np.array_equal(due, kept[self].due) and kept[self].hold(first)):
+            kept.pop(self, None)  # those of the last block make room
+            kept[self] = self._kind(first, due, self._gains_of)
+            kept[self].usable &= self._together.issuperset(codes_of(due))
+        return kept[self]
 
     def _pack(
         self,

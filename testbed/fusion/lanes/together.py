@@ -19,7 +19,7 @@ from testbed.fusion.lanes.settling import SettlingGains
 from testbed.fusion.lanes.shared import KalmanGains, SharedLanes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from testbed.fusion.base import BlockFilter, EstimateBlock
     from testbed.fusion.lanes.pack import Received
@@ -50,9 +50,15 @@ class Together:
         elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
             self._lanes = AdaptiveLanes(example, buffers)
 
-    def process(self, filters: Sequence[BlockFilter], received: Received) -> list[EstimateBlock]:
-        """Return what each filter gives for its readings of a block; it holds until the next one of those that share
-        the buffers.
+    @property
+    def in_lanes(self) -> bool:
+        """Whether they can go side by side."""
+        return self._lanes is not None
+
+    def process(self, filters: Sequence[BlockFilter], received: Received) -> Iterator[EstimateBlock]:
+        """Yield what each filter gives for its readings of a block; it holds until the next one of those that share
+        the buffers. All of them are to be taken: a filter that goes alone works when it is its turn, so that no more
+        than one estimate of such is there at a time.
 
         Parameters
         ----------
@@ -65,7 +71,7 @@ class Together:
         if self._lanes is not None:
             whole = [m for m, (Z, _, timing) in enumerate(received) if timing is None and not np.isinf(Z).any()]
             done = self._lanes.advance(filters, received, whole)
-        return [done[m] if m in done else one.estimated(*received[m]) for m, one in enumerate(filters)]
+        return (done[m] if m in done else one.estimated(*received[m]) for m, one in enumerate(filters))
 
 
 def _plain(one: ModelFilter) -> bool:

@@ -53,7 +53,7 @@ def in_blocks(n, rng, lengths):
 
 
 def process(together, lanes, given):
-    return together.process(lanes, [one.received(values) for one, values in zip(lanes, given, strict=True)])
+    return [*together.process(lanes, [one.received(values) for one, values in zip(lanes, given, strict=True)])]
 
 
 def assert_same(alone, ours):
