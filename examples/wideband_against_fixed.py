@@ -132,8 +132,13 @@ def errors_and_claims(name: str, records: Sequence[Record], start: str, **own: o
     together, n, squares = Together(filters[0]), records[0][0].size, []
     for part in (slice(k * n // 4, (k + 1) * n // 4) for k in range(4)):
         blocks = together.process(filters, [Received(Z[:, part], gated[:, part], None) for Z, gated, _ in received])
-        errors = [block.rate - rate[part] for block, (rate, _) in zip(blocks, records, strict=True)]
-        squares.append([[rms(error) ** 2, rms(block.std) ** 2] for error, block in zip(errors, blocks, strict=True)])
+        # Each holds until the next one is asked for.
+        squares.append(
+            [
+                [rms(block.rate - rate[part]) ** 2, rms(block.std) ** 2]
+                for block, (rate, _) in zip(blocks, records, strict=True)
+            ]
+        )
     _, second, third, fourth = np.array(squares)
     found: FloatArray = np.sqrt(np.stack([second, 0.5 * (third + fourth)], axis=-1)) / DEG
     return found

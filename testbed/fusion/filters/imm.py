@@ -72,6 +72,10 @@ class Imm(BlockFilter):
 
     Parameters: ClassVar[type[Part]] = ImmParameters
     any_clock = True
+    caution = (
+        "from an unknown start a model too slow for the signal spoils what the start leaves open, and all models mix "
+        "it in: for seven seconds the error may be ten times the claim"
+    )
     start_leaves = (0.0045 * DEG, 0.0045 * DEG)
 
     def __init__(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from testbed.fusion import estimate
 from testbed.fusion.filters.imm import Imm
 from testbed.fusion.filters.kalman import Kalman
 from testbed.fusion.filters.vb_akf import VbAkf
 from testbed.fusion.model import build_model
 from tests.contract.records import BELIEF, RATES, built, readings_of, sines
+from tests.records import FS, cut, mixed, record, rms
 
 N_TIME = 3000
 
@@ -178,3 +180,18 @@ def test_imm_tells_a_calm_signal_from_an_agile_one():
     for block in (calm, agile):
         total = sum(block.diagnostics[f"probability_{j}"] for j in range(3))
         np.testing.assert_allclose(total, 1.0, rtol=0, atol=1e-12)
+
+
+def test_imm_lets_its_slowest_model_spoil_an_unknown_start():
+    """A model too slow for 10 Hz takes its lag for a constant rate, which an unknown start leaves open and no reading
+    takes back: mixed in, it is an error many times the claim. One model by itself is honest on the same readings.
+    """
+    rate, z = cut(*record(mixed, 9.0, 1), 5.8)
+    part = slice(round(1.0 * FS), round(3.0 * FS))
+    over = {}
+    for ratios in ((0.01, 1.0, 100.0), (1.0,)):
+        found = estimate("imm", z, sample_rate_hz=RATES, belief="identified", ratios=ratios, verdict=False)
+        over[ratios] = rms((found.rate - rate)[part]) / rms(found.std[part])
+    assert over[1.0,] < 1.5
+    assert over[0.01, 1.0, 100.0] > 4.0
+    assert "ten times the claim" in Imm.caution
