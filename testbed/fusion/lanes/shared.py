@@ -49,6 +49,8 @@ class SharedLanes:
         self._run = module_of(source).run
         self._gains_of = gains_kernel(len(example._x), len(self._model.H), self._model.n_slow)
         self._buffers = buffers
+        # Its place among what is kept; these lanes themselves would be a cycle, which lives until it is collected.
+        self._place = object()
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
         """Advance those filters of `whole` that have the same past, and return their estimates by number.
@@ -77,11 +79,12 @@ class SharedLanes:
     def _gains_for(self, first: Any, due: Any) -> KalmanGains | SettlingGains:
         """Return the covariance over the block, which other filters may have asked for already."""
         kept: dict[Any, KalmanGains | SettlingGains] = self._buffers.kept
-        if self not in kept or not (np.array_equal(due, kept[self].due) and kept[self].hold(first)):
-            kept.pop(self, None)  # those of the last block make room
-            kept[self] = self._kind(first, due, self._gains_of)
-            kept[self].usable &= self._together.issuperset(codes_of(due))
-        return kept[self]
+        at = self._place
+        if at not in kept or not (np.array_equal(due, kept[at].due) and kept[at].hold(first)):
+            kept.pop(at, None)  # those of the last block make room
+            kept[at] = self._kind(first, due, self._gains_of)
+            kept[at].usable &= self._together.issuperset(codes_of(due))
+        return kept[at]
 
     def _pack(
         self,
