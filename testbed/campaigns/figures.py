@@ -44,11 +44,11 @@ def figures_of(found: Summary, axes: Mapping[str, str]) -> dict[str, Markup]:
     words = {key: f"{key} [{axes[key]}]" for key in numeric}
     if not numeric:
         return {}
-    (key, values), *others = numeric.items()
-    log = by_ratios(values)
-    drawn = {name: chart(panels, words[key], height, log=log) for name, panels, height in panels_of(found, key)}
+    key, *others = numeric
+    log = {key: by_ratios(values) for key, values in numeric.items()}
+    drawn = {name: chart(panels, words[key], height, log=log[key]) for name, panels, height in panels_of(found, key)}
     if others and any(kind == "filter" for kind, _ in found.points):
-        drawn["map"] = map_of(found, numeric, words, {key: by_ratios(values) for key, values in numeric.items()})
+        drawn["map"] = map_of(found, numeric, words, log)
     return drawn
 
 
