@@ -57,7 +57,7 @@ def test_what_is_left_out_is_told_with_its_place():
 def test_too_little_that_moves_is_refused_with_the_reason():
     rate = white()
     rate[2000:8000] = rate[2000]
-    with pytest.raises(ScenarioError, match="expected at least half of 10000 samples.*5999 readings stand still"):
+    with pytest.raises(ScenarioError, match=r"expected at least half of 10000 samples.*5999 readings stand still"):
         analyse(record(rate))
 
 
