@@ -94,10 +94,10 @@ def test_a_reader_that_goes_ends_the_command_quietly(tmp_path):
 
 @pytest.mark.parametrize("delay", [0, 1, 2, 4, 6, 9])
 def test_ctrl_c_while_libraries_load_ends_with_130_and_no_traceback(tmp_path, delay):
-    """From where our own code begins, which is told by what it has loaded, over half a second of imports."""
+    """From where our own code has begun, which is told by what it has loaded, over half a second of imports."""
     code = (
         "import os, sys, threading, time, signal\n"
-        f"def kill():\n    time.sleep({0.05 * delay})\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        f"def kill():\n    time.sleep({0.02 + 0.05 * delay})\n    os.kill(os.getpid(), signal.SIGINT)\n"
         "from testbed.cli import entry\n"
         "install = entry._Stopped.__init__\n"
         "def begin(self):\n    install(self)\n    threading.Thread(target=kill).start()\n"
