@@ -139,7 +139,7 @@ def test_a_parent_that_is_killed_at_20_random_moments_loses_nothing_that_was_fin
     command = [sys.executable, "-m", "tests.campaigns.killed", str(path), str(out)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as launches:
         for number in range(20):
-            launches.stdin.write(f"{number % 4 // 3} {rng.uniform(0.0, 0.7)}\n")
+            launches.stdin.write(f"{number % 4 // 3} {rng.uniform(0.0, 0.4)}\n")
             launches.stdin.flush()
             ends.append(launches.stdout.readline().strip())
             now = finished(out)

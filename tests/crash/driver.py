@@ -298,8 +298,15 @@ def disk(number, folder):
     return {"ends": ends, "faults": faults, "needed_bytes": needed}
 
 
+def load(folder):
+    """Run in memory what the forks run: they find libraries and kernels loaded, and no thread has begun by it."""
+    folder.mkdir()
+    testbed.run(short(folder))
+
+
 if __name__ == "__main__":
     what, *given = sys.argv[1:]
+    load(Path(given[-1]) / "loaded")
     if what == "kill":
         numbers = {name: int(number) for name, _, number in (one.partition("=") for one in given[0].split(","))}
         found = {name: kill(name, number, int(given[1]), Path(given[2]) / name) for name, number in numbers.items()}

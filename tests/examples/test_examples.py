@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import os
-import subprocess
+import runpy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -99,18 +98,14 @@ def test_design_refuses_what_makes_no_sense(choice: list[str], capsys: pytest.Ca
         ("design_channel", ["--fluid", "galinstan", "--closure", "radial_field", "--load-fraction", "0.5", "--figure"]),
     ],
 )
-def test_example_prints_and_draws(name: str, options: list[str], tmp_path: Path) -> None:
-    picture = tmp_path / "figure.png"
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / f"{name}.py"), *options, str(picture)],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-        env={**os.environ, "PYTHONPATH": str(EXAMPLES.parent)},
-    )
+def test_example_prints_and_draws(
+    name: str, options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, program = tmp_path / "figure.png", EXAMPLES / f"{name}.py"
+    monkeypatch.setattr("sys.argv", [str(program), *options, str(picture)])
+    runpy.run_path(str(program), run_name="__main__")
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert len(done.stdout.splitlines()) > 8
+    assert len(capsys.readouterr().out.splitlines()) > 8
 
 
 def test_a_filter_just_switched_on_is_less_linear_than_a_settled_one() -> None:
