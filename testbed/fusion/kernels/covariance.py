@@ -91,32 +91,17 @@ SENSOR = np.dtype(
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def between(M, table, j, s, n, rows):  # pragma: no cover
-    """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal."""
-    if s == 0.0:
-        for a in range(rows):
-            for b in range(n):
-                M[a, b] = table[j, a, b]
-        for a in range(rows, n):
-            M[a, a] = table[j, a, a]
-        return
-    part = M.dtype.type(s)
+    """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal.
+
+    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it. One
+    way through: where there were two, numba would count references to both arrays, at the cost of a step.
+    """
+    part, after = M.dtype.type(s), j + 1 if s > 0.0 else j
     for a in range(rows):
         for b in range(n):
-            M[a, b] = table[j, a, b] + part * (table[j + 1, a, b] - table[j, a, b])
+            M[a, b] = table[j, a, b] + part * (table[after, a, b] - table[j, a, b])
     for a in range(rows, n):
-        M[a, a] = table[j, a, a] + part * (table[j + 1, a, a] - table[j, a, a])
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def reach_step(F, Q, j, s, tables, at, n, rows):  # pragma: no cover
-    """Set F and Q to those of a step that ends the share s behind node j; `at` = (j, s) of what they hold.
-
-    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it.
-    """
-    if at[0] != j or at[1] != s:
-        between(F, tables[0], j, s, n, rows)
-        between(Q, tables[1], j, s, n, rows)
-        at[0], at[1] = j, s
+        M[a, a] = table[j, a, a] + part * (table[after, a, a] - table[j, a, a])
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -542,8 +527,8 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         H = np.empty((n_sensor, n), kind)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
-        lost, at = np.empty(1, kind), np.full(2, -1.0)
-        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        lost = np.empty(1, kind)
+        node, share, whole, F_between, Q_between = clocked
         rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
@@ -556,9 +541,11 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
             if node.size > 0:
                 stop = alike(node, share, whole, begin)
                 if started and whole[begin] > 0:
-                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    between(F, F_between, NODES, 0.0, n, rows)
+                    between(Q, Q_between, NODES, 0.0, n, rows)
                     coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
-                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+                between(F, F_between, node[begin], share[begin], n, rows)
+                between(Q, Q_between, node[begin], share[begin], n, rows)
             for k in range(begin, stop):
                 if started:
                     if form == SQUARE_ROOT:
@@ -656,7 +643,9 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
         n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H, g, gain, at = np.empty((n_sensor, n)), np.empty(n), np.empty(n), np.full(3, -1.0)
+        H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
+        # What F and Q hold: the step of that node and share, and the noise of the sensors that are there.
+        placed, ending, present = -1, 0.0, -1
         node, share, before_it, F_between, Q_between = clocked
         Q[:] = Q_in[progress[PRESENT]]
         K, C_settled, settled, before = cycle
@@ -671,15 +660,18 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             there = progress[PRESENT]
             if progress[STARTED] > 0:
                 if node.size > 0:
-                    tables = (F_between, Q_between[there])
-                    at[0] = at[0] if at[2] == there else -1.0
                     if before_it[k] > 0:
-                        reach_step(F, Q, NODES, 0.0, tables, at, n, core)
+                        between(F, F_between, NODES, 0.0, n, core)
+                        between(Q, Q_between[there], NODES, 0.0, n, core)
                         coast_toward(x, P, F, Q, reach, work, moved, g, n, core, last, before_it[k])
-                    reach_step(F, Q, node[k], share[k], tables, at, n, core)
-                elif at[2] != there:
+                        placed = -1
+                    if node[k] != placed or share[k] != ending or there != present:
+                        between(F, F_between, node[k], share[k], n, core)
+                        between(Q, Q_between[there], node[k], share[k], n, core)
+                        placed, ending = node[k], share[k]
+                elif present != there:
                     Q[:] = Q_in[there]
-                at[2] = there
+                present = there
                 move(x, F, reach, moved, n, core)
             if progress[MODE] == SETTLED:
                 whole = True
@@ -907,8 +899,8 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
         square = np.empty(n_sensor)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
-        array, lost, at = np.empty((n, 2 * n), kind), np.empty(1, kind), np.full(2, -1.0)
-        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        array, lost = np.empty((n, 2 * n), kind), np.empty(1, kind)
+        node, share, whole, F_between, Q_between = clocked
         rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
@@ -922,9 +914,11 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
             if node.size > 0:
                 stop = alike(node, share, whole, begin)
                 if progress[0] > 0.0 and whole[begin] > 0:
-                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    between(F, F_between, NODES, 0.0, n, rows)
+                    between(Q, Q_between, NODES, 0.0, n, rows)
                     coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
-                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+                between(F, F_between, node[begin], share[begin], n, rows)
+                between(Q, Q_between, node[begin], share[begin], n, rows)
             for k in range(begin, stop):
                 predicted = progress[0] > 0.0
                 if predicted:
