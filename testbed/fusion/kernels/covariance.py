@@ -778,18 +778,20 @@ def judge_band(sensor):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def inflation(sensor, window, square, C):  # pragma: no cover
+def inflation(sensor, windows, i, square, C):  # pragma: no cover
     """Return S of (36): max(1, alpha C_hat / C), C_hat the mean (34) of `square` over the last readings."""
-    if sensor.alpha == 0.0:
-        return 1.0
-    at = sensor.window_count % window.size
-    sensor.window_sum += square - window[at]
-    window[at] = square
+    n_window = windows.shape[1]
+    at = sensor.window_count % n_window
+    sensor.window_sum += square - windows[i, at]
+    windows[i, at] = square
     sensor.window_count += 1
-    if at == window.size - 1:
+    if at == n_window - 1:
         # Once a lap the sum is formed anew: the rounding left by one huge innovation must not stay for ever.
-        sensor.window_sum = window.sum()
-    mean = sensor.window_sum / min(sensor.window_count, window.size)
+        total = 0.0
+        for m in range(n_window):
+            total += windows[i, m]
+        sensor.window_sum = total
+    mean = sensor.window_sum / min(sensor.window_count, n_window)
     return max(1.0, sensor.alpha * mean / C)
 
 
@@ -822,30 +824,16 @@ def adapt_offset(sensor, e):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def observe(sensor, window, e, spread, z, row):  # pragma: no cover
-    """Prepare the use of the reading z with the innovation e (11) and spread H P H': N_k, band, R and S; fill its `row`
-    of diagnostics.
+def observe(sensor, e, z):  # pragma: no cover
+    """Prepare the use of the reading z with the innovation e (11): N_k, band and R.
 
-    Return the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
+    Return the square that stands for e e' in (17) and (34), NaN if there is no difference yet.
     """
     watch_increments(sensor, z)
     judge_band(sensor)
     if sensor.follow and sensor.increments > 0:
         set_R(sensor, sensor.increment_variance)
-    square = e * e
-    if sensor.difference:
-        square = 0.5 * (e - sensor.previous_innovation) ** 2
-    C = spread + sensor.R
-    factor = 1.0
-    if np.isfinite(square):
-        factor = inflation(sensor, window, square, C)
-    row[INNOVATION] = e
-    row[INNOVATION_VARIANCE] = C
-    row[R_USED] = sensor.R
-    row[INCREMENTS] = sensor.increment_variance if sensor.increments > 0 else np.nan
-    row[BAND] = sensor.band if sensor.band >= 0 else np.nan
-    row[INFLATION] = factor
-    return square, factor * sensor.R
+    return 0.5 * (e - sensor.previous_innovation) ** 2 if sensor.difference else e * e
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -949,7 +937,16 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
                         due[i], e[i] = False, kind.type(0.0)
                         continue
                     read = True
-                    square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
+                    square[i], factor = observe(sensors[i], e[i], Z[i, k]), 1.0
+                    if sensors[i].alpha != 0.0 and np.isfinite(square[i]):
+                        factor = inflation(sensors[i], windows, i, square[i], spread[i] + sensors[i].R)
+                    R[i] = factor * sensors[i].R
+                    out[row + INNOVATION, k], out[row + INNOVATION_VARIANCE, k] = e[i], spread[i] + sensors[i].R
+                    out[row + R_USED, k], out[row + INFLATION, k] = sensors[i].R, factor
+                    if sensors[i].increments > 0:
+                        out[row + INCREMENTS, k] = sensors[i].increment_variance
+                    if sensors[i].band >= 0:
+                        out[row + BAND, k] = sensors[i].band
                 if adapts_Q:
                     for j in range(n):
                         x_prior[j] = x[j]
