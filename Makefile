@@ -2,6 +2,7 @@
 PYTHON ?= python3
 SCENARIO ?= scenarios/mixed_0p5hz_10hz.yaml
 BIN := .venv/bin
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 # One thread per library: the chain is sequential, and the tests run side by side.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -13,12 +14,18 @@ $(BIN)/python:
 	$(PYTHON) -m venv .venv
 
 .venv/installed: pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	$(INSTALL) --editable .
 	touch $@
 
 .venv/installed-test: .venv/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[test]"
+	$(INSTALL) --editable ".[test]"
 	touch $@
+
+# For who wants all of it: resolved once, and compiled on two cores, where pip takes one; a file for another Python fails.
+.venv/installed-all: pyproject.toml constraints.txt | $(BIN)/python
+	$(INSTALL) --no-compile --editable ".[docs,test]"
+	-@$(BIN)/python -m compileall -qq -j 2 .venv
+	touch .venv/installed .venv/installed-docs .venv/installed-test $@
 
 run: .venv/installed
 	$(BIN)/testbed run $(SCENARIO)
@@ -37,7 +44,7 @@ test: lint
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal --durations=15 --durations-min=5
 
 .venv/installed-docs: .venv/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[docs]"
+	$(INSTALL) --editable ".[docs]"
 	touch $@
 
 # The site, gallery included, in docs/_build/html; needs no network once it is installed, and a warning is an error.

@@ -48,7 +48,7 @@ class Blend(BlockFilter):
         blend(self._x, self._P, self._model.F, self._model.Q, self._model.H, self._model.R, self._K, Z, out)
 
 
-@njit
+@njit(cache=True)
 def blend(x, P, F, Q, H, R, K, Z, out):
     """Correct the model's rate by the gains, and carry the covariance of what is left, gaps included."""
     for k in range(Z.shape[1]):

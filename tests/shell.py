@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 Said = subprocess.CompletedProcess[str]
 
 
-def call(*arguments: object, cwd: str | Path) -> Said:
+def call(*arguments: object, cwd: str | Path, encoding: str = "utf-8") -> Said:
     """Return what the shell would see of ``testbed ARGUMENTS`` in a folder, said by this process."""
     words = ["testbed", *map(str, arguments)]
-    out, error = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    out, error = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2))
     status: Any = 0
     with (
         contextlib.chdir(cwd),
@@ -39,7 +39,7 @@ def call(*arguments: object, cwd: str | Path) -> Said:
             main()
         except SystemExit as end:
             status = end.code or 0
-    said, complained = (stream.buffer.getvalue().decode() for stream in (out, error))
+    said, complained = (stream.buffer.getvalue().decode(encoding) for stream in (out, error))
     return subprocess.CompletedProcess(words, status, said, complained)
 
 

@@ -16,6 +16,7 @@ from testbed.allan import AllanCurve, AllanFit, allan_deviation, fit_allan
 from testbed.allan.fit import judge_fit, term_variance
 from testbed.errors import Problem, ScenarioError
 from testbed.judging.allan_words import data_sheet, remarks_on
+from testbed.judging.faulty_readings import without_faults
 from testbed.judging.rounding import is_rounding, rounding_text, without_rounding
 from testbed.pages.axes import marked
 from testbed.pages.numbers import significant
@@ -170,17 +171,20 @@ def analyse(record: RateRecord, min_tau: float | None = None, max_tau: float | N
     Returns
     -------
     Analysis
-        Curve over all averaging times, fit over the range.
+        Curve over all averaging times, fit over the range; of the record without readings that stand still or far off
+        their neighbours, as its notes tell.
 
     Raises
     ------
     ScenarioError
         If the record is too short or constant, or the range too narrow.
     """
+    said, record = len(record.notes), without_faults(record)
     try:
         curve = without_rounding(allan_deviation(record.rate, record.sample_rate_hz), record)
     except ValueError as error:
-        raise ScenarioError([Problem(str(error), file=record.content)]) from error
+        why = "; ".join([str(error), *record.notes[said:]])
+        raise ScenarioError([Problem(why, file=record.content)]) from error
     if not np.all(curve.deviation > 0.0) and is_rounding(record):
         raise ScenarioError([Problem(rounding_text(record), file=record.content)])
     if np.nanmin(record.rate) == np.nanmax(record.rate):

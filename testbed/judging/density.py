@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from testbed.errors import Problem, ScenarioError, quoted
 from testbed.judging.allan_records import read
 from testbed.judging.allan_words import line_text
+from testbed.judging.faulty_readings import faulty_readings
 from testbed.judging.run_signals import run_records
 from testbed.logs.options import quantity
 from testbed.metrics.lines import spectral_lines
@@ -178,8 +179,9 @@ def estimate_density(
     freq, density, freedom, words, bridged = make(rate, record, segment)
     notes = list(record.notes)
     if lost:
-        done = "bridged by straight lines" if bridged else "left out with their segments"
-        notes.append(f"{lost} of {rate.size} samples are missing, {done}")
+        low = f"bridged by straight lines: near half the sample rate up to {200.0 * lost / rate.size:.2g} % is missing"
+        notes.append(f"{lost} of {rate.size} samples are missing, {low if bridged else 'left out with their segments'}")
+    notes += [f"{one.text}: the density is of them too" for one in faulty_readings(record)]
     notes += [line_text(line) for line in spectral_lines(record.rate, record.sample_rate_hz)]
     sides = 2 if two_sided else 1
     return RateDensityEstimate(record, freq[1:], density[1:] * (2.0 / sides), sides, freedom, words, tuple(notes))

@@ -173,6 +173,8 @@ def channel_findings(table: Table, clock: TimeBase | None, values: Values, one: 
 
 def _repeats_text(values: Values, label: str) -> str:
     n = values.repeats
+    if values.still:
+        return f"{label} stands still for up to {values.row_equal} samples in a row, as no noise does: it was stuck"
     return f"each value stands {n:.3g} times in {label}: the sensor is slower; --average {n:.0f} takes each once"
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from testbed.signals import FloatArray
 
 # Rows of the outline beyond which pairs are joined, and samples that the word is looked for in.
@@ -16,8 +18,11 @@ _ROWS, _SAMPLE = 8192, 200_000
 _FAR = 20.0
 # A word is one if all differences are whole multiples of it to this part, up to so many words.
 _WHOLE, _MOST_WORDS = 0.05, 1e9
-# Share of equal neighbours, and word in steps, from which on values count as repeated.
-_REPEATED, _FINE = 0.2, 0.2
+# Share of equal neighbours, and word in steps, from which on values count as repeated; of a slower sensor no value
+# stands more than so many times the usual number.
+_REPEATED, _FINE, _UNUSUAL = 0.2, 0.2, 10.0
+# Words that a record must reach over to be at an end of its range, and not of its noise.
+_NOISE_WORDS = 8.0
 # Share of samples at an end that counts as saturation, if three stand in a row or the words are a tenth of the noise:
 # chance puts several samples on the same coarse word.
 _AT_END, _IN_A_ROW, _FINE_WORD = 1e-3, 3, 0.1
@@ -41,6 +46,8 @@ class Values:
         Share of numbers that are equal to the one before.
     repeats : float
         How many times each value stands, where values are repeated rather than rounded; else 1.
+    row_equal : int
+        The most equal numbers in a row.
     at_low, at_high : int
         How many stand at an end.
     row_low, row_high : int
@@ -61,6 +68,7 @@ class Values:
     word: float
     equal: float
     repeats: float
+    row_equal: int
     at_low: int
     at_high: int
     row_low: int
@@ -81,12 +89,19 @@ class Values:
     @property
     def saturated(self) -> bool:
         """Whether the numbers stand still at an end, as those of a sensor out of its range do."""
+        if self.rounded and self.high - self.low < _NOISE_WORDS * self.word:
+            return False
         fine = self.word < _FINE_WORD * self.step_std
         still = (self.at_low, self.row_low), (self.at_high, self.row_high)
         many = max(_AT_END * self.n_time, _IN_A_ROW)
         return self.repeats == 1.0 and any(
             n > many and (fine or row >= _IN_A_ROW) for n, row in still if self.std > 0.0
         )
+
+    @property
+    def still(self) -> bool:
+        """Whether repeated values are no slower sensor's: one stands far longer than they usually do."""
+        return self.repeats > 1.0 and self.row_equal > _UNUSUAL * self.repeats
 
     @property
     def rounded(self) -> bool:
@@ -103,7 +118,7 @@ class ValueScan:
         self._n_pairs, self._pair_square = 0, 0.0
         self._low, self._high = np.inf, -np.inf
         self._ends = {-1: (0, 0), 1: (0, 0)}
-        self._last = np.nan
+        self._last, self._row_equal = np.nan, 0
         self._sample: list[FloatArray] = []
         self._outline, self._stride = np.empty((0, 2)), 1
 
@@ -148,6 +163,7 @@ class ValueScan:
             word=word,
             equal=equal,
             repeats=1.0 / (1.0 - equal) if repeated and equal < 1.0 else 1.0,
+            row_equal=self._row_equal,
             at_low=self._ends[-1][0],
             at_high=self._ends[1][0],
             row_low=self._ends[-1][1],
@@ -158,6 +174,7 @@ class ValueScan:
 
     def _pairs(self, values: FloatArray) -> None:
         steps = np.diff(values, prepend=self._last)
+        self._row_equal = max(self._row_equal, 1 + _longest_row(steps == 0.0))
         steps = steps[np.isfinite(steps)]
         self._n_pairs += steps.size
         self._n_equal += int(np.count_nonzero(steps == 0.0))
@@ -181,11 +198,15 @@ class ValueScan:
         for side, old, new in ((-1, self._low, low), (1, self._high, high)):
             count, row = self._ends[side] if old == new else (0, 0)
             here = known == new
-            if here.any():
-                edges = np.flatnonzero(np.diff(np.concatenate([[False], here, [False]]).astype(np.int8)))
-                count, row = count + int(here.sum()), max(row, int(np.diff(edges)[::2].max()))
+            count, row = count + int(np.count_nonzero(here)), max(row, _longest_row(here))
             self._ends[side] = (count, row)
         self._low, self._high = low, high
+
+
+def _longest_row(here: NDArray[np.bool_]) -> int:
+    """Return the most that are true in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], here, [False]]).astype(np.int8)))
+    return int(np.diff(edges)[::2].max()) if edges.size else 0
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:

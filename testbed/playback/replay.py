@@ -16,6 +16,7 @@ from testbed.chain.versions import versions
 from testbed.errors import Problem, ScenarioError, quoted
 from testbed.inputs.plugins import load_plugins
 from testbed.logs.clock import NANO
+from testbed.logs.options import saying_keys
 from testbed.logs.reader import is_map
 from testbed.notebook import Run, open_run
 from testbed.playback.cross import sensor_agreement
@@ -210,7 +211,8 @@ def prepare(
     if start not in {None, "unknown", "rest"}:
         raise ScenarioError([Problem(f"expected unknown or rest, got {quoted(start)}", "--start")])
     loaded = load_plugins(plugins)
-    opened = open_source([log] if isinstance(log, str | Path) else log, map)
+    with saying_keys():
+        opened = open_source([log] if isinstance(log, str | Path) else log, map)
     names, file = _asked(filters)
     specs = filter_specs(opened.sensors, names, fusion if file is None else file, belief, start, loaded)
     both = [name for name in specs if name in opened.sensors]
@@ -223,10 +225,12 @@ def prepare(
     _check_asked(settle, lines, opened)
     if named is not None:
         named(opened.name)
-    source = opened.read()
+    with saying_keys():
+        source = opened.read()
+        wound = [wind(channel) for channel in source.sensors.values()]
+        reference = None if source.reference is None else wind(source.reference, middle=True)
     said = {name: 1.0 / abs(one.factor) for name, one in source.sensors.items() if one.kind == "rate"}
-    reels, found = judged([wind(channel) for channel in source.sensors.values()], specs, said, fix=fix)
-    reference = None if source.reference is None else wind(source.reference, middle=True)
+    reels, found = judged(wound, specs, said, fix=fix)
     lineup = line_up(reels, reference, source.log)
     chosen_settle = min(_SETTLING * lineup.duration, _LONGEST_SETTLING) if settle is None else settle
     if chosen_settle >= lineup.duration:

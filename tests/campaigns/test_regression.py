@@ -267,6 +267,8 @@ def test_the_command_says_what_it_takes_and_what_moved_by_its_status(tiny, tmp_p
     assert done.exit_code == 0
     document = json.loads(done.stdout)
     assert {one["name"] for one in document["standings"]} == {"kalman", "complementary"}
+    # How long it took, which needs no word of what workers spent.
+    assert 0.0 < document["seconds"] < 600.0
     rows = [{**row, "rmse_deg_s": 2.0 * row["rmse_deg_s"]} for row in read_history(history)]
     history.unlink()
     append(rows, {}, SHORT, "A planted drift.", history)

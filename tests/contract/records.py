@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from testbed.fusion import FILTERS
+from testbed.fusion.base import EstimateBlock
 from testbed.fusion.belief import load_belief
 from testbed.parts import resolve
 from testbed.signals import LinearFilter, random_stream
@@ -62,3 +63,9 @@ def readings_of(
         readings[name] = taken + one.output_noise * np.sqrt(rates[name]) * outer.standard_normal(taken.size)
         readings[name].flags.writeable = False
     return readings
+
+
+def joined(blocks: list[EstimateBlock]) -> EstimateBlock:
+    """Return blocks that follow each other as one."""
+    diagnostics = {key: np.concatenate([b.diagnostics[key] for b in blocks]) for key in blocks[0].diagnostics}
+    return EstimateBlock(np.concatenate([b.rate for b in blocks]), np.concatenate([b.std for b in blocks]), diagnostics)

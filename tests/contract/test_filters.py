@@ -14,11 +14,12 @@ from pydantic import ValidationError
 from testbed.errors import UnknownNameError
 from testbed.fusion import FILTERS, estimate
 from testbed.fusion.analysis.indicator import FREQUENCY
-from testbed.fusion.base import BlockFilter, EstimateBlock, diagnostic_unit
+from testbed.fusion.base import BlockFilter, diagnostic_unit
 from testbed.fusion.model_filter import ModelFilter
-from tests.contract.records import BELIEF, METHODS, NAMES, RATES, built, named, readings_of, sines
+from tests.contract.records import BELIEF, METHODS, NAMES, RATES, built, joined, named, readings_of, sines
 
 if TYPE_CHECKING:
+    from testbed.fusion.base import EstimateBlock
     from testbed.signals import FloatArray
 
 N_TIME = 6007  # not a multiple of the stride, so blocks may end between gyro samples
@@ -35,11 +36,6 @@ def bare(block: EstimateBlock) -> EstimateBlock:
     """Return a block without the frequencies that `estimate` puts beside what the filter says of itself."""
     own = {key: value for key, value in block.diagnostics.items() if not key.startswith(FREQUENCY)}
     return replace(block, diagnostics=own)
-
-
-def joined(blocks: list[EstimateBlock]) -> EstimateBlock:
-    diagnostics = {key: np.concatenate([b.diagnostics[key] for b in blocks]) for key in blocks[0].diagnostics}
-    return EstimateBlock(np.concatenate([b.rate for b in blocks]), np.concatenate([b.std for b in blocks]), diagnostics)
 
 
 @pytest.fixture(scope="module")

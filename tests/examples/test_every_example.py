@@ -27,7 +27,15 @@ SMALL = {
         "x optimum",
     ),
     "frequency_indicator": (
-        lambda its: {"SIGNALS": first(its.SIGNALS), "AMPLITUDES": first(its.AMPLITUDES), "SWEEP_HZ": its.SWEEP_HZ[-2:]},
+        lambda its: {
+            "SIGNALS": first(its.SIGNALS),
+            "AMPLITUDES": first(its.AMPLITUDES),
+            "SWEEP_HZ": its.SWEEP_HZ[-2:],
+            "LINES_HZ": its.LINES_HZ[-1:],
+            "WINDOWS": its.WINDOWS[:1],
+            "RECORDS": 1,
+            "NOISIER": its.NOISIER[-1:],
+        },
         ["figure.png"],
         "wrote figure.png",
     ),

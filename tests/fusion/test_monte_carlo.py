@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -87,8 +88,9 @@ def monte_carlo(name: str) -> Found:
         pytest.skip(f"{name} reports no innovations")
     rate, z = simulate(*truth_model(name, stage), seed=4)
     nees, innovations = np.empty((RUNS, len(INSTANTS))), {sensor: [] for sensor in RATES}
+    fresh = built(name)
     for run in range(RUNS):
-        block = built(name).process({"mems_gyro": z[run, 0, ::10], "mhd_ars": z[run, 1]})
+        block = deepcopy(fresh).process({"mems_gyro": z[run, 0, ::10], "mhd_ars": z[run, 1]})
         nees[run] = ((block.rate - rate[run]) / block.std)[list(INSTANTS)] ** 2
         for sensor, pieces in innovations.items():
             e, C = (

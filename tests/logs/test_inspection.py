@@ -53,6 +53,14 @@ def test_each_fault_is_found(tmp_path):
     assert report.values.repeats == pytest.approx(4.0, rel=0.01)
     coarse = [f"{value:.0f}" for value in np.rint(RATE)]
     assert kinds(reports(tmp_path, lines(SECONDS, coarse, head="t,w [deg/s]\n"))[0]) == {"rounding"}
+    stuck = [*DEG[:500], *[DEG[500]] * (N_TIME - 1000), *DEG[-500:]]
+    (report,) = reports(tmp_path, lines(SECONDS, stuck, head="t,w [deg/s]\n"))
+    assert kinds(report) == {"repeats"}
+    assert f"stands still for up to {N_TIME - 1000} samples in a row" in report.findings[0].message
+    # Two words, to and fro, are the ends of the noise and not of the range.
+    between = np.random.default_rng(4).random(N_TIME) < 0.15
+    two = [f"{0.07 * one:.2f}" for one in between]
+    assert kinds(reports(tmp_path, lines(SECONDS, two, head="t,w [deg/s]\n"))[0]) == {"rounding"}
     empty = [text if k % 100 else "" for k, text in enumerate(DEG)]
     assert kinds(reports(tmp_path, lines(SECONDS, empty, head="t,w [deg/s]\n"))[0]) == {"missing"}
     twice = [*SECONDS[:700], *SECONDS[699:-1]]
@@ -81,7 +89,7 @@ def test_blocks_give_the_same_values_as_the_whole():
     for part in np.array_split(values, 17):
         parts.add(part)
     one, other = whole.result(), parts.result()
-    for name in ("n_time", "n_missing", "low", "high", "word", "equal", "at_low", "at_high"):
+    for name in ("n_time", "n_missing", "low", "high", "word", "equal", "at_low", "at_high", "row_equal"):
         assert getattr(one, name) == pytest.approx(getattr(other, name)), name
     for name in ("mean", "std", "step_std"):
         assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-12), name

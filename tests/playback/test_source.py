@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -73,15 +75,21 @@ def test_parts_of_a_recording_are_one(tmp_path):
 @pytest.mark.parametrize(
     ("head", "message"),
     [
-        ("t_us,w1,w2,temp", "to be said: w1: unit"),
-        ("t_us,w1 [deg],w2 [deg],temp [degC]", r"w1: increment or angle \(--kind\)"),
-        ("k,w1 [deg/s],w2 [deg/s],temp [degC]", r"w1: sample rate \(--rate\) or column of the time"),
+        ("t_us,w1,w2,temp", r"to be said: w1: unit \(unit, or scale of a count\)"),
+        ("t_us,w1 [deg],w2 [deg],temp [degC]", r"w1: increment or angle \(kind\)"),
+        (
+            "k,w1 [deg/s],w2 [deg/s],temp [degC]",
+            r"w1: sample rate \(time.rate\) or column of the time \(time.column\)",
+        ),
     ],
 )
 def test_everything_that_is_open_is_told_at_once(head, message, tmp_path):
     with pytest.raises(ScenarioError, match=message) as error:
         testbed.replay(bench_csv(tmp_path, head), ["kalman"])
     assert len(error.value.problems) >= 3  # both channels and the way out
+    # Replay has no option of a single column: what is open stands in a map.
+    options = set(re.findall(r"--[a-z-]+", str(error.value)))
+    assert options == {"--map", "--out"}
 
 
 def test_no_recording_is_told():

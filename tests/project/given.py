@@ -78,6 +78,7 @@ def edited(text: str, edits: Mapping[str, str]) -> str:
 
 # Files of the repository that a page plays: shorter here, tests/test_scenarios.py plays each whole.
 _SHORTER: dict[str, dict[str, dict[str, str]]] = {
+    "first_run": {"scenarios/mixed_0p5hz_10hz.yaml": {"duration": "12 s"}},
     "commands": {"scenarios/mixed_0p5hz_10hz.yaml": {"duration": "0.4 s", "settle": "0.2 s"}},
     "identify": {"scenarios/identification.yaml": {"duration": "6 s", "settle": "1 s", "wideband": "{type: kalman}"}},
     "pointing": {"scenarios/pointing/satellite_link.yaml": {"duration": "2 s", "settle": "1 s"}},

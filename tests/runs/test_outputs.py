@@ -12,6 +12,7 @@ import pytest
 import testbed
 from testbed.runs.outputs import OUTPUTS, chosen
 from tests.scenes import short, short_file
+from tests.shell import call
 
 FILES = {"netcdf": "run.nc", "recording": "recording.rrd", "report": "report.html"}
 
@@ -69,8 +70,7 @@ def test_what_cannot_be_is_refused(tmp_path):
 )
 def test_the_command_takes_a_list(tmp_path, arguments, status, said):
     path = short_file(tmp_path)
-    command = [sys.executable, "-m", "testbed", "run", str(path), "--out", str(tmp_path / "run"), "--quiet", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = call("run", path, "--out", tmp_path / "run", "--quiet", *arguments, cwd=tmp_path)
     assert done.returncode == status, done.stderr
     assert said in done.stderr
     if not status:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +30,7 @@ class Outcome:
     """What came of a standard campaign.
 
     `moves` is what is no longer as in the baseline, `incomparable` what has none, `standings` the leaderboard,
-    `failures` the rows of cases that failed, `cpu_seconds` the processor time of this launch.
+    `failures` the rows of cases that failed, `seconds` how long this launch took, whatever its workers did at a time.
     """
 
     folder: Path
@@ -38,7 +38,7 @@ class Outcome:
     incomparable: Sequence[str]
     standings: Sequence[Standing]
     failures: Sequence[Mapping[str, Any]]
-    cpu_seconds: float
+    seconds: float
 
 
 def run_regression(
@@ -86,7 +86,7 @@ def run_regression(
         )
     if update is not None:
         check_reason(update)
-    begun = _spent()
+    begun = time.monotonic()
     plugins = entry.plugins if entry else ()
     study = replace(standard_study(entry or shipped(), short=short), code=code_sha256(plugins))
     target = Path(out) if out else Path("runs") / "_".join([study.name, *(entry.fusion if entry else ())])
@@ -103,17 +103,11 @@ def run_regression(
     same = [row for row in before if entry is None or row["source"] in mine]
     others = [row for row in before if entry is not None and row["source"] not in mine]
     costs = {row["source"]: row["cost"] for row in others if row["cost"] is not None} | costs
-    order, spent = standings([*others, *rows], costs), _spent() - begun
-    found = Outcome(folder, moves(rows, same), incomparable(rows, same), order, failures, spent)
+    order, took = standings([*others, *rows], costs), time.monotonic() - begun
+    found = Outcome(folder, moves(rows, same), incomparable(rows, same), order, failures, took)
     if update is not None:
         if failures:
             raise ScenarioError([Problem(f"{len(failures)} runs failed, first: {failures[0]['reason']}", "--update")])
         append(rows, costs, campaign, update, history)
     write_leaderboard(folder, study, found.standings, found.moves, read_history(history), campaign)
     return found
-
-
-def _spent() -> float:
-    """Return the processor time of this process and of those that it started and that ended [s]."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system

@@ -68,7 +68,7 @@ def _document(found: Outcome) -> dict[str, Any]:
         "moves": [_defined(asdict(one)) for one in found.moves],
         "without_baseline": list(found.incomparable),
         "failures": [{name: row[name] for name in ("case", "seed", "reason")} for row in found.failures],
-        "cpu_seconds": found.cpu_seconds,
+        "seconds": found.seconds,
         "written": str(found.folder),
     }
 
@@ -100,5 +100,5 @@ def _print(found: Outcome) -> None:
         console.print(f"and {len(lines) - _MOST_LINES} more, in leaderboard.html")
     if found.moves:
         console.print("If that is meant, store it: testbed regress --update 'what changed the numbers'")
-    console.print(f"{found.cpu_seconds:.0f} s of processor time")
+    console.print(f"it took {found.seconds:.0f} s")
     console.print(f"wrote {found.folder}: cases.parquet, sweep.html, leaderboard.html")

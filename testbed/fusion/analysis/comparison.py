@@ -115,7 +115,7 @@ def compared(noisy: tuple[str, Trace], clean: tuple[str, Trace], clean_noise: No
         timed=noisy[1].interval >= clean[1].interval,
         scaled=clean[1].belief.sees_constant or not noisy[1].belief.sees_constant,
     )
-    both = f"{noisy[0]} and {clean[0]}: sign, gain, offset and rate:"
+    both = f"{noisy[0]} and {clean[0]}: sign, unit, gain, offset and rate:"
     one, other = (without_repeats(trace) for trace in (noisy[1], clean[1]))
     common = min(one.t[-1], other.t[-1]) - max(one.t[0], other.t[0])
     if common < max(_LEAST_SECONDS, _LEAST_READINGS * max(one.interval, other.interval)):

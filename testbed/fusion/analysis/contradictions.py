@@ -26,7 +26,8 @@ _MODEL = 2e-3
 _MEMORY, _SLOW = 5e-3, 1.0
 # From here on the response of an octave, or the noise between bands, is not what is believed [-].
 _DEPARTURE, _SLOPE = 0.05, 3.0
-# How close a gain, or a noise, is to a factor between units, to be one, and what an odd unit must explain: logarithms.
+# How close a gain, or the noise of two odd units, is to a factor between units to be one, and what an odd unit must
+# explain: logarithms.
 _CLOSE, _ODD = 0.08, 0.7
 # A mean is no bias below this [rad/s], and shows only through dynamics that pass a constant with at least this gain.
 _LEAST_BIAS, _LEAST_SEEN = math.radians(0.01), 0.1
@@ -74,8 +75,8 @@ def _factors(said: float) -> list[float]:
 def unit_factors(
     gain: float | None, noisy: NoiseRatio | None, clean: NoiseRatio | None, said: tuple[float, float] = (1.0, 1.0)
 ) -> tuple[float, float]:
-    """Return by what the readings of two sensors are too large because of their units [-]: what explains their gain and
-    their noise by the fewest odd units.
+    """Return by what the readings of two sensors are too large because of their units [-]: what explains their gain,
+    and most of their noise, by the fewest odd units; 1 where no common motion gives a gain, since noise has any size.
 
     Parameters
     ----------
@@ -86,14 +87,17 @@ def unit_factors(
     said : tuple of float, optional
         The unit that was said of each, as of `Trace`.
     """
+    if gain is None:
+        return 1.0, 1.0
     loud = [0.0 if one is None else math.log(max(float(one.value[one.least]), 1e-300)) for one in (noisy, clean)]
     pairs = [(math.log(one), math.log(other)) for one in _factors(said[0]) for other in _factors(said[1])]
-    if gain is not None:
-        pairs = [pair for pair in pairs if abs(math.log(gain) - pair[0] + pair[1]) < _CLOSE] or [(0.0, 0.0)]
-    else:
-        pairs = [
-            pair for pair in pairs if all(u == 0.0 or abs(u - r) < _CLOSE for u, r in zip(pair, loud, strict=True))
-        ]
+    # Two odd units take the noise of both for witness: a gain of one is no sign of any.
+    pairs = [
+        pair
+        for pair in pairs
+        if abs(math.log(gain) - pair[0] + pair[1]) < _CLOSE
+        and (0.0 in pair or all(abs(u - r) < _CLOSE for u, r in zip(pair, loud, strict=True)))
+    ] or [(0.0, 0.0)]
 
     def cost(pair: tuple[float, float]) -> float:
         return sum(abs(r - u) + _ODD * (u != 0.0) for u, r in zip(pair, loud, strict=True))
@@ -121,7 +125,7 @@ def unit_findings(factors: Mapping[str, float], found: Agreement, said: Mapping[
         unit = _unit_name(factor * said[name], "")
         words = f"it reads in {unit}, not in {wanted}" if unit else "it reads in rad/s, not in what was said"
         half = math.exp(_CLOSE)
-        if found.common and sum(one != 1.0 for one in factors.values()) == 1:
+        if sum(one != 1.0 for one in factors.values()) == 1:
             half = 1.0 + _half(found)
         yield Finding(
             "unit", name, factor, factor / half, factor * half, "1", f"{words}: divide its readings by {factor:.6g}"
@@ -348,7 +352,7 @@ def undecided_of(pair: Pair, found: Agreement, kinds: Collection[str], names: Na
     """
     both = f"{names.noisy} and {names.clean}"
     if not found.common:
-        yield f"{both}: sign, gain, offset and rate: no motion shows in both"
+        yield f"{both}: sign, unit, gain, offset and rate: no motion shows in both"
     else:
         yield from _not_close(found, kinds, names)
         if math.isfinite(found.ambiguity):

@@ -142,7 +142,10 @@ def loudness_findings(name: str, noise: NoiseRatio | None, factor: float) -> Ite
     least, most = noise.least, int(np.argmax(noise.value))
     lower, upper = noise.interval(least)
     if lower > _LOUD * factor:
-        remedy = "its noise is so many times the believed one: raise input_noise and output_noise of the belief"
+        remedy = (
+            "its noise is so many times the believed one: raise input_noise and output_noise of the belief, unless its "
+            "unit or scale is wrong, which noise alone does not tell"
+        )
         yield Finding("belief", name, float(noise.value[least]) / factor, lower / factor, upper / factor, "1", remedy)
     lower, upper = noise.interval(most)
     if _SILENT * factor < upper < _QUIET * factor:

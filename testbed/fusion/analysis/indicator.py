@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 LAGS_S = tuple(0.5e-3 * 4.0**i for i in range(6))
 # Time constant of the means [s], and signal over noise, by energy, from which a lag is used.
 MEMORY_S, MARGIN = 1.0, 1.0
+# A mean says something once it holds this share of the readings that it holds in the long run: before, and soon after a
+# gap has begun, the noise of a few readings passes for a signal of any frequency.
+ENOUGH = 0.1
 FREQUENCY = "frequency_"
 # A lag is long enough once the signal turns by this angle in it [rad]; the next shorter one then sees at least a
 # quarter of a turn less.
@@ -43,8 +46,8 @@ def energies(z: FloatArray, lag: int) -> tuple[FloatArray, FloatArray]:
     .. math:: \Psi_k = z_{k-L}^2 - z_k z_{k-2L} = A^2 \sin^2 \theta, \quad
         \Psi^d_k = d_{k-L}^2 - d_k d_{k-2L} = 4 A^2 \sin^2(\theta/2) \sin^2 \theta, \quad d_k = z_k - z_{k-L}
 
-    for z = A sin(2 pi f t + phi) and theta = 2 pi f L T: constant, without the ripple of z^2. A constant in z leaves
-    their mean alone.
+    for z = A sin(2 pi f t + phi) and theta = 2 pi f L T: constant, without the ripple of z^2. A constant c in z leaves
+    their mean over many periods alone, but makes the first ripple by c A.
 
     Parameters
     ----------
@@ -122,7 +125,7 @@ def fits_lags(sample_rate_hz: float) -> bool:
 
 @dataclass(frozen=True)
 class FrequencyBlock:
-    """Frequencies over a block, NaN where no signal stands above the noise.
+    """Frequencies over a block, NaN where no signal stands above the noise, or too few readings are known to tell.
 
     Parameters
     ----------
@@ -148,14 +151,16 @@ class _Energies:
         self._noise = [noise_energies(belief, sample_rate_hz, lag) for lag in self.lags]
         self._margin = margin
         self._keep = float(np.exp(-1.0 / (sample_rate_hz * memory)))
+        self._enough = ENOUGH / (1.0 - self._keep)
         self._past = np.full(3 * self.lags[-1], np.nan)
-        self._memory = np.zeros((len(self.lags), 3, 1))
+        # Of the means of each lag, and of the readings: their values and how many there are.
+        self._memory = np.zeros((len(self.lags) + 1, 3, 1))
 
     def process(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the corrected energies of signal and increments, shape (n_lag, n_time) [rad^2/s^2]; NaN before the
         first.
         """
-        z = np.concatenate([self._past, np.where(np.abs(z) < _LARGEST, z, np.nan)])
+        z = np.concatenate([self._past, self._less_level(np.where(np.abs(z) < _LARGEST, z, np.nan))])
         n = z.size - self._past.size
         means = np.empty((2, len(self.lags), n))
         for i, (lag, noise) in enumerate(zip(self.lags, self._noise, strict=True)):
@@ -164,9 +169,16 @@ class _Energies:
             weight = self._fade(i, 2, there.astype(float))
             for j in range(2):
                 total = self._fade(i, j, np.where(there, pair[j], 0.0))
-                means[j, i] = np.divide(total, weight, out=np.full(n, np.nan), where=weight > 0.0) - noise[j]
+                means[j, i] = np.divide(total, weight, out=np.full(n, np.nan), where=weight > self._enough) - noise[j]
         self._past = z[n:]
         return means[0], means[1]
+
+    def _less_level(self, z: FloatArray) -> FloatArray:
+        """Return readings less their fading mean: a filter leaves a line its frequency, and no constant remains."""
+        there = np.isfinite(z)
+        weight = self._fade(len(self.lags), 0, there.astype(float))
+        total = self._fade(len(self.lags), 1, np.where(there, z, 0.0))
+        return z - np.divide(total, weight, out=np.zeros(z.size), where=there)
 
     def _fade(self, lag: int, which: int, values: FloatArray) -> FloatArray:
         faded, self._memory[lag, which] = lfilter([1.0], [1.0, -self._keep], values, zi=self._memory[lag, which])
@@ -238,7 +250,7 @@ class FrequencyIndicator:
     By increments, from each sensor alone: the ratio of two energies at one lag, :math:`f = \theta / (2 \pi L T)`. By
     comparing both sensors: :math:`\Psi_a / \Psi_b = |H_a(f)|^2 / |H_b(f)|^2`, solved for f with the believed responses,
     over the frequencies where that ratio rises. Energies are means with an exponential memory, less what
-    the believed noise adds.
+    the believed noise adds; the readings are taken less their own mean of that memory.
 
     Parameters
     ----------

@@ -7,7 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from testbed.fusion.analysis.indicator import LAGS_S, FrequencyIndicator, FrequencyRows, energies, noise_energies, turn
+from testbed.fusion.analysis.indicator import (
+    ENOUGH,
+    LAGS_S,
+    FrequencyIndicator,
+    FrequencyRows,
+    energies,
+    noise_energies,
+    turn,
+)
 from testbed.fusion.belief import load_belief
 from testbed.signals import random_stream
 
@@ -62,7 +70,8 @@ def test_the_indication_is_the_same_for_every_amplitude() -> None:
     blocks = []
     for factor in (1.0, 2.0**20):
         z = {name: factor * sine(7.0, 0.1, round(fs), fs) for name, fs in RATES.items()}
-        blocks.append(FrequencyIndicator(silent, RATES).process(z))
+        # After 25 memories the start, whose mean is not the later one, has faded to 1e-11.
+        blocks.append(FrequencyIndicator(silent, RATES, memory=0.04).process(z))
     small, large = blocks
     for name in RATES:
         assert np.array_equal(small.by_increments[name], large.by_increments[name], equal_nan=True)
@@ -74,20 +83,22 @@ def test_the_indication_is_the_same_for_every_amplitude() -> None:
 @pytest.mark.parametrize("amplitude", [0.1, 1.0, 100.0])
 @pytest.mark.parametrize("freq", [0.5, 10.0, 100.0])
 def test_frequency_within_the_error_that_the_noise_leaves(freq: float, amplitude: float) -> None:
-    """Sine through the believed responses plus white noise, 3 s."""
-    fs, memory = RATES["mhd_ars"], 1.0
+    """Sine through the believed responses plus white noise, 14.4 s, of whose start e^-18 is left in means of 0.8 s."""
+    fs, memory = RATES["mhd_ars"], 0.8
     quiet = BELIEF["mems_gyro"].model_copy(update={"input_noise": 0.0, "output_noise": 1e-7})
     belief = {"mems_gyro": quiet, "mhd_ars": BELIEF["mhd_ars"]}
     z, level = {}, {}
     for name, rate in RATES.items():
         level[name] = amplitude * DEG * abs(belief[name].realisation().response(np.array([freq]))[0])
-        noise = belief[name].output_noise * np.sqrt(rate) * random_stream(4, name).standard_normal(round(3 * rate))
+        noise = belief[name].output_noise * np.sqrt(rate) * random_stream(4, name).standard_normal(round(14.4 * rate))
         z[name] = sine(freq, level[name], noise.size, rate) + noise
     block = FrequencyIndicator(belief, RATES, memory=memory).process(z)
     R, n = belief["mhd_ars"].output_noise ** 2 * fs, 2.0 * memory * fs
     tau = next(lag for lag in LAGS_S if 2.0 * np.pi * freq * lag >= np.pi / 8.0)
     theta = 2.0 * np.pi * freq * tau
-    A, c = level["mhd_ars"], 2.0 - 2.0 * np.cos(theta)
+    # What the mean of the readings leaves of the line, the high-pass of the same memory.
+    left = abs(1.0 / (1.0 + 1.0 / (2j * np.pi * freq * memory)))
+    A, c = left * level["mhd_ars"], 2.0 - 2.0 * np.cos(theta)
     # Variances of the mean energies. Signal times noise: a reading's noise is weighed by at most four neighbours of the
     # signal (by the window, nothing need cancel), mean square 8 A^2; for the increments, c times larger in square, two
     # of them per reading. Noise times noise: three products of variance R^2, or (2 R)^2, each correlated with two more.
@@ -102,21 +113,53 @@ def test_frequency_within_the_error_that_the_noise_leaves(freq: float, amplitude
         assert block.by_sensors[-1] == pytest.approx(freq, rel=0.02, abs=0.0)
 
 
-def test_no_signal_has_no_frequency() -> None:
+@pytest.mark.parametrize("seed", range(5, 9))
+def test_no_signal_has_no_frequency_from_the_first_reading_on(seed: int) -> None:
+    """Whatever the constant beside the noise, even while the means hold few readings."""
     z = {
-        name: BELIEF[name].output_noise * np.sqrt(fs) * random_stream(5, name).standard_normal(round(4 * fs))
+        name: DEG + BELIEF[name].output_noise * np.sqrt(fs) * random_stream(seed, name).standard_normal(round(2 * fs))
         for name, fs in RATES.items()
     }
     block = FrequencyIndicator(BELIEF, RATES).process(z)
     for values in (*block.by_increments.values(), block.by_sensors):
-        assert np.isnan(values[values.size // 2 :]).all()
+        assert np.isnan(values).all()
+
+
+@pytest.mark.parametrize("bias_deg_s", [0.2, 20.0])
+def test_a_constant_beside_a_line_does_not_change_its_frequency(bias_deg_s: float) -> None:
+    """A tenth of a degree per second beside the bias of a gyro from the shelf."""
+    fs = RATES["mems_gyro"]
+    noise = BELIEF["mems_gyro"].output_noise * np.sqrt(fs) * random_stream(6, "noise").standard_normal(round(2 * fs))
+    line = sine(10.0, 0.1 * DEG, noise.size) + noise
+    plain, biased = (
+        FrequencyRows(BELIEF, {"mems_gyro": fs}).process({"mems_gyro": z}, noise.size)["frequency_mems_gyro"]
+        for z in (line, line + bias_deg_s * DEG)
+    )
+    there = np.isfinite(plain)
+    assert there[noise.size // 2 :].all()
+    # A mean of 2000 terms rounds by 2000 eps of the bias at the most; the ratio of energies doubles it.
+    error = 2 * 2000 * np.finfo(float).eps * bias_deg_s / 0.1
+    np.testing.assert_allclose(biased[there], plain[there], rtol=10 * error, atol=0.0)
+
+
+def test_a_gap_has_no_frequency_once_its_readings_have_faded_and_the_next_line_is_seen_behind_it() -> None:
+    fs = RATES["mems_gyro"]
+    z = np.concatenate([sine(10.0, DEG, 4000), np.full(8000, np.nan), sine(25.0, DEG, 4000)])
+    rows = FrequencyRows(BELIEF, {"mems_gyro": fs}).process({"mems_gyro": z}, z.size)["frequency_mems_gyro"]
+    faded = 4000 + round(fs * np.log(1.0 / ENOUGH))
+    assert np.isnan(rows[faded:12_000]).all()
+    assert rows[5000] == pytest.approx(10.0, rel=1e-2, abs=0.0)
+    # exp(-4) of what was, at a sixth of the weight per energy, is left when the gap ends; a second later e^-5.
+    assert rows[14_000] == pytest.approx(25.0, rel=1e-2, abs=0.0)
 
 
 @pytest.mark.parametrize("edges", [(1, 40, 9000), (333, 20_000)])
 def test_blocks_of_any_length_give_the_same_bits(reference: Any, edges: tuple[int, ...]) -> None:
     z = reference.readings(reference.sines((4.0, 1.0), duration=2.0), 3)
     z["mhd_ars"][12_000:12_100], z["mems_gyro"][700] = np.nan, np.nan
-    whole, stage = FrequencyIndicator(BELIEF, RATES).process(z), FrequencyIndicator(BELIEF, RATES)
+    # Short means, so that the start has faded at the end.
+    whole, stage = (FrequencyIndicator(BELIEF, RATES, memory=0.1) for _ in range(2))
+    whole = whole.process(z)
     parts = [
         stage.process({"mems_gyro": z["mems_gyro"][-(-a // 10) : -(-b // 10)], "mhd_ars": z["mhd_ars"][a:b]})
         for a, b in zip((0, *edges), (*edges, 40_000), strict=True)

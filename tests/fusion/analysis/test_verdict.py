@@ -103,6 +103,29 @@ def test_at_rest_nothing_is_decided_and_nothing_found():
     assert any("no motion shows in both" in text for text in found.undecided)
 
 
+@pytest.mark.parametrize("factor", [6.2, 10.0, 57.3])
+def test_without_common_motion_noise_is_no_unit(factor):
+    """Within 8 % of rev/s, rpm and deg/s: a gyro with so much noise is as likely."""
+    _, readings = record(still, DURATION, 3)
+    loud = readings | {"mems_gyro": factor * readings["mems_gyro"]}
+    for said in ({}, dict.fromkeys(loud, UNITS["deg/s"])):
+        found = verdict(loud, stamps_of(loud), EQ39, said)
+        assert kinds(found) == [("belief", "mems_gyro")]
+        assert any("sign, unit, gain, offset and rate: no motion shows in both" in text for text in found.undecided)
+
+
+@pytest.mark.parametrize("factor", [4.0, 10.0, 50.0])
+def test_two_sensors_that_agree_and_are_far_noisier_than_believed_have_no_odd_unit(moving, factor):
+    readings, time_ns = moving
+    quiet = {
+        name: one.model_copy(
+            update={"input_noise": one.input_noise / factor, "output_noise": one.output_noise / factor}
+        )
+        for name, one in EQ39.items()
+    }
+    assert set(kinds(verdict(readings, time_ns, quiet))) == {("belief", "mems_gyro"), ("belief", "mhd_ars")}
+
+
 def slow(t):
     return 5.0 * DEG * np.sin(0.4 * np.pi * t)
 

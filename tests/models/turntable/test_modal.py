@@ -67,8 +67,8 @@ def test_modes_are_mujoco_at_a_sixteenth_of_its_step_on_every_quiet_scenario(pat
     scenario = load_scenario(SCENARIOS / path)
     mountings = {name: sensor.mounting for name, sensor in scenario.sensors.items()}
     assert scenario.turntable.mode in {"servo", "ideal"}
-    # A profile begins with its ramp: the part behind it is louder, and a quarter of a second of it is enough.
-    n_time = 20 if scenario.lines == () and "static" in path.stem else 16_000
+    # A profile begins with its ramp of 0.1 s: the part behind it is louder, and a quarter of a second of it is enough.
+    n_time = 20 if scenario.lines == () and "static" in path.stem else round(0.35 * BASE_RATE_HZ)
     found = [
         play(scenario.turntable, scenario.profile(0.1), cuts=(0, n_time), sensors=mountings, **options)
         for options in ({"substeps": 16}, {"modal": True})
