@@ -27,7 +27,7 @@ NEAR = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def merge_stamps(time, value, bounds, period, fastest, memory, out):  # pragma: no cover
+def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PLR0912  # pragma: no cover
     """Fill `out` with the steps of a block, advance `memory`, and return how many there are.
 
     Parameters
