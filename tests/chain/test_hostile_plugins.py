@@ -82,7 +82,7 @@ sensors:
   own: {type: "MODULE:Gyro", sample_rate: 1 kHz}
 fusion:
   mine: {type: "MODULE:Filter", belief: BELIEF}
-  kalman: {belief: BELIEF}
+  complementary: {belief: BELIEF}
 """
 BELIEF = (
     "{mhd_ars: {numerator: [1, 0], denominator: [1, 10], output_noise: 100 nrad/s/sqrt(Hz)}, "
@@ -197,7 +197,7 @@ def test_a_plugin_that_keeps_and_changes_its_arrays_changes_nothing(scene):
     scenario = clean_of(scene, sly)
     run = testbed.run(scenario, block=0.1)
     assert np.array_equal(run.fusion["mine"].rate, clean.fusion["mine"].rate)
-    assert np.array_equal(run.fusion["kalman"].rate, clean.fusion["kalman"].rate)
+    assert np.array_equal(run.fusion["complementary"].rate, clean.fusion["complementary"].rate)
 
 
 def clean_of(scene, body):

@@ -216,8 +216,10 @@ def test_arrays_have_no_exact_belief():
     """Fusion knows no presets, so it refuses the word and says who knows."""
     with pytest.raises(ValueError, match="belief_of"):
         estimate("kalman", {"mhd_ars": np.zeros(10)}, sample_rate_hz={"mhd_ars": 20000.0}, belief="exact")
-    known = {"mhd_ars": belief_of("mhd03", exact=True)}
-    found = estimate("kalman", {"mhd_ars": np.zeros(10)}, sample_rate_hz={"mhd_ars": 20000.0}, belief=known)
+    known = {"mhd_ars": belief_of("mhd03", exact=True), "mems_gyro": belief_of("adis16505_filtered", exact=True)}
+    # A filter that compiles nothing for the size of a belief.
+    rates, readings = {"mhd_ars": 20000.0, "mems_gyro": 2000.0}, {"mhd_ars": np.zeros(10), "mems_gyro": np.zeros(1)}
+    found = estimate("complementary", readings, sample_rate_hz=rates, belief=known)
     assert np.isfinite(found.rate).all()
 
 
