@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from testbed.sensors.base import Sensor
     from testbed.signals import ComplexArray, FloatArray
 
-# Time for the gains to settle, the pulse in it, and that for its answer [s]; all short against a slow sensor's drift.
-_SETTLE, _AT, _ANSWER = 4.0, 0.05, 4.0
+# Where the pulse stands in its answer, and how long that is at least and at most [s]; how long gains are waited for at
+# the most, which what a filter learns of slow noise moves for half a minute.
+_AT, _SHORTEST, _LONGEST, _MOST_SETTLED = 0.05, 4.0, 32.0, 60.0
 _WIDTH, _HIGHEST_HZ = 0.3e-3, 700.0
 _SIZE = 1e-3
 # Twice the pulse gives twice the answer, or the filter is not linear.
@@ -53,8 +54,10 @@ class FilterResponse:
         return response
 
 
-def filter_response(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_hz: float) -> FilterResponse:
-    """Return the responses of a filter of these sensors.
+def filter_response(
+    spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_hz: float, begin: float, end: float
+) -> FilterResponse:
+    """Return the responses of a filter of these sensors, as its gains are in the middle of what is judged.
 
     Parameters
     ----------
@@ -64,13 +67,17 @@ def filter_response(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_h
         The instruments, noise-free here.
     base_rate_hz : float
         Base clock [Hz].
+    begin, end : float
+        From when until when it is judged, from its start on [s].
 
     Raises
     ------
     ValueError
         If the filter does not take these sensors, or is not linear: it adapts to what it reads.
     """
-    t = np.arange(round(_ANSWER * base_rate_hz)) / base_rate_hz
+    # What is slower than the judged stretch is long does not show in it.
+    length = min(max(end - begin, _SHORTEST), _LONGEST)
+    t = np.arange(round(length * base_rate_hz)) / base_rate_hz
     pulse = _SIZE * np.exp(-0.5 * ((t - _AT) / _WIDTH) ** 2)
     ratio = {name: round(base_rate_hz / sensor.sample_rate) for name, sensor in sensors.items()}
     step = min(ratio.values())
@@ -79,7 +86,7 @@ def filter_response(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_h
         name: sensor.model_copy(update={"noise": False}).start(base_rate_hz, 0, name).process(pulse)
         for name, sensor in sensors.items()
     }
-    settled = _settled(spec, sensors, base_rate_hz)
+    settled = _settled(spec, sensors, base_rate_hz, min(0.5 * (begin + end), _MOST_SETTLED))
     whole = _answer(settled, seen)
     twice = _answer(settled, {name: 2.0 * values for name, values in seen.items()})
     if np.max(np.abs(twice - 2.0 * whole)) > _LINEAR * np.max(np.abs(whole)):
@@ -98,11 +105,11 @@ def filter_response(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_h
     return FilterResponse(freq[known], over_pulse(whole - pulse[::step]), alone)
 
 
-def _settled(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_hz: float) -> Any:
-    """Return the filter once its gains have settled, at rest."""
+def _settled(spec: FilterSpec, sensors: Mapping[str, Sensor], base_rate_hz: float, at: float) -> Any:
+    """Return the filter as its gains are at a time [s], at rest."""
     rates = {name: sensor.sample_rate for name, sensor in sensors.items()}
     stage: Any = _ungated(spec).start(rates)
-    samples = round(_SETTLE * base_rate_hz)
+    samples = round(at * base_rate_hz)
     stage.process({name: np.zeros(round(samples * rate / base_rate_hz)) for name, rate in rates.items()})
     return stage
 

@@ -300,13 +300,12 @@ class BlockFilter:
             self._pending = np.full(len(self._rows_of(0)), np.nan)
         n_time = timing.time_ns.size
         kept, begin = np.empty((self._pending.size, n_time)), 0
-        # In parts that stay in the processor's cache, all in one place.
-        room = np.empty(self._pending.size * min(_PART, Z.shape[1]))
+        # In parts that stay in the processor's cache, all in one place, which is undefined whenever one begins.
+        room = np.full(self._pending.size * min(_PART, Z.shape[1]), np.nan)
         for first in range(0, Z.shape[1], _PART):
             part = slice(first, first + _PART)
             shown = timing.shown[part]
             out = room[: self._pending.size * shown.size].reshape(self._pending.size, shown.size)
-            out.fill(np.nan)
             self._advance(_read_only(Z[:, part]), out, steps_of(timing.length[part]))
             show_steps(out, shown, HEADER_ROWS, self._pending, kept, begin)
             begin += int(np.count_nonzero(shown))

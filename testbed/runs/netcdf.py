@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from testbed.signals import FloatArray
 
 _CHUNK = 20_000
+# Of each signal the piece that is being written stays in memory [bytes]: HDF5 would keep 8 MB of each.
+_KEPT = 2 * 8 * _CHUNK
 # Attribute of a group whose `time` is no multiple of one step.
 STAMPED = "stamps"
 _PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
@@ -95,7 +97,7 @@ class NetcdfStore:
         self._rates, self._times = rates, times
         self._n_base = round(duration * rates["base"])
         self._raw = _ShieldedFile(path, "w+")
-        self._hdf = h5py.File(self._raw, "w", track_order=True)
+        self._hdf = h5py.File(self._raw, "w", track_order=True, rdcc_nbytes=_KEPT)
         self._file = h5netcdf.File(self._hdf, "w")
         # As HDF5 has them: looking up a variable takes longer than writing it.
         self._datasets: dict[tuple[str, str], h5py.Dataset] = {}

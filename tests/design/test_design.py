@@ -69,12 +69,32 @@ def test_spectra_and_a_run_agree_within_five_percent(found, mirror):
 
 
 @pytest.mark.oracle
+def test_spectra_and_a_run_agree_from_an_unknown_start_with_a_wrong_belief(tmp_path):
+    """The gains are those of the middle of what is judged; those of the fourth second make 3.8 times of it here."""
+    path = tmp_path / "unknown.yaml"
+    text = SHORT.replace("duration: 6 s", "duration: 16 s").replace("settle: 2 s", "settle: 8 s")
+    text = text.replace("identified, cost: 2}", "eq39, start: unknown}").replace("adis16505_filtered", "adis16505")
+    drop = ("  wideband", "  plain", "  coarse")
+    lines = [line for line in text.splitlines(keepends=True) if not line.startswith(drop)]
+    path.write_text("".join(lines).replace("trackers:\n", "trackers:\n  coarse: {}\n  slow: {bandwidth: 1 Hz}\n"))
+    asked = read_requirement(path)
+    both = [one for one in search(asked).candidates if len(one.sensors) == 2]
+    quick, slow = (next(one for one in both if one.tracker == name) for name in ("coarse", "slow"))
+    run = testbed.run(chosen_scenario(asked, quick)).metrics.pointing["kalman"]
+    print(quick.values, run.residual_rms_urad)
+    # Gains still move within what is judged, which has no spectrum: 6 % of it.
+    assert_allclose(quick.values["residual_rms_urad"], run.residual_rms_urad, rtol=0.1)
+    assert quick.doubts == ()
+    assert "lets through what the filter's start has left" in slow.doubts[0]
+
+
+@pytest.mark.oracle
 def test_a_filter_makes_of_a_sine_what_its_pulse_says(found):
     """A Kalman filter of both sensors at 20 Hz, played: T to 1e-3."""
     asked, _ = found
     whole, f = asked.scenario, 20.0
     spec = whole.fusion["kalman"]
-    response = filter_response(spec, whole.sensors, 20_000.0)
+    response = filter_response(spec, whole.sensors, 20_000.0, whole.frame.settle, whole.frame.duration)
     t = np.arange(60_000) / 20_000.0
     rate = 1e-3 * np.sin(2.0 * np.pi * f * t)
     readings = {

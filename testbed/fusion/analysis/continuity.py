@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 # A gap is a finding from this length [s] and this many intervals on, and whatever their lengths from this share on.
 _LONG_GAP, _INTERVALS, _LOST = 0.01, 5.0, 0.02
+# Words are coarse from so many believed ones on, if all steps are whole ones to this part.
+_COARSE, _WHOLE = 2.0, 0.05
 
 
 def continuity_findings(name: str, trace: Trace, factor: float = 1.0) -> Iterator[Finding]:
@@ -39,10 +42,17 @@ def continuity_findings(name: str, trace: Trace, factor: float = 1.0) -> Iterato
     # What stands at the end of the range repeats itself there.
     stuck = repeated(trace) & ~at_end
     if stuck.any():
-        remedy = (
+        said = (
             f"{np.count_nonzero(stuck)} readings repeat each other, more than {_most(trace)} in a row, as none of the "
-            "believed noise and resolution do: mend what stuck, or take them for missing"
+            "believed noise and resolution do"
         )
+        word = _coarse_word(trace)
+        remedy = f"{said}: mend what stuck, or take them for missing"
+        if word:
+            remedy = (
+                f"{said}, and filters take them for missing: all are words of {math.degrees(word):.4g} deg/s, so "
+                "believe that resolution"
+            )
         yield Finding("repeats", name, np.count_nonzero(stuck) / count, math.nan, math.nan, "1", remedy)
     ends = np.count_nonzero(at_end)
     if ends:
@@ -51,6 +61,21 @@ def continuity_findings(name: str, trace: Trace, factor: float = 1.0) -> Iterato
             "range, or correct that of the belief"
         )
         yield Finding("saturation", name, ends / count, math.nan, math.nan, "1", remedy)
+
+
+def _coarse_word(trace: Trace) -> float:
+    """Return the word of readings that are coarser than is believed, and repeat no longer than such words do [rad/s]; 0
+    if they are not.
+    """
+    z = trace.z[np.isfinite(trace.z)]
+    steps = np.diff(np.unique(z))
+    word = float(steps.min(initial=math.inf))
+    if not _COARSE * (trace.belief.resolution or math.inf) < word < math.inf:
+        return 0.0
+    if np.any(np.abs(steps / word - np.rint(steps / word)) > _WHOLE):
+        return 0.0
+    coarse = replace(trace, belief=trace.belief.model_copy(update={"resolution": word}))
+    return 0.0 if repeated(coarse).any() else word
 
 
 def repeated(trace: Trace) -> NDArray[np.bool_]:

@@ -91,32 +91,17 @@ SENSOR = np.dtype(
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def between(M, table, j, s, n, rows):  # pragma: no cover
-    """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal."""
-    if s == 0.0:
-        for a in range(rows):
-            for b in range(n):
-                M[a, b] = table[j, a, b]
-        for a in range(rows, n):
-            M[a, a] = table[j, a, a]
-        return
-    part = M.dtype.type(s)
+    """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal.
+
+    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it. One
+    way through: where there were two, numba would count references to both arrays, at the cost of a step.
+    """
+    part, after = M.dtype.type(s), j + 1 if s > 0.0 else j
     for a in range(rows):
         for b in range(n):
-            M[a, b] = table[j, a, b] + part * (table[j + 1, a, b] - table[j, a, b])
+            M[a, b] = table[j, a, b] + part * (table[after, a, b] - table[j, a, b])
     for a in range(rows, n):
-        M[a, a] = table[j, a, a] + part * (table[j + 1, a, a] - table[j, a, a])
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def reach_step(F, Q, j, s, tables, at, n, rows):  # pragma: no cover
-    """Set F and Q to those of a step that ends the share s behind node j; `at` = (j, s) of what they hold.
-
-    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it.
-    """
-    if at[0] != j or at[1] != s:
-        between(F, tables[0], j, s, n, rows)
-        between(Q, tables[1], j, s, n, rows)
-        at[0], at[1] = j, s
+        M[a, a] = table[j, a, a] + part * (table[after, a, a] - table[j, a, a])
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -542,8 +527,8 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
         H = np.empty((n_sensor, n), kind)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
         array, e, due = np.empty((n, 2 * n), kind), np.empty(n_sensor, kind), np.empty(n_sensor, np.bool_)
-        lost, at = np.empty(1, kind), np.full(2, -1.0)
-        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        lost = np.empty(1, kind)
+        node, share, whole, F_between, Q_between = clocked
         rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
@@ -556,9 +541,11 @@ def kalman_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) ->
             if node.size > 0:
                 stop = alike(node, share, whole, begin)
                 if started and whole[begin] > 0:
-                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    between(F, F_between, NODES, 0.0, n, rows)
+                    between(Q, Q_between, NODES, 0.0, n, rows)
                     coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
-                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+                between(F, F_between, node[begin], share[begin], n, rows)
+                between(Q, Q_between, node[begin], share[begin], n, rows)
             for k in range(begin, stop):
                 if started:
                     if form == SQUARE_ROOT:
@@ -656,7 +643,9 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
         n, n_sensor, core = np.int64(states), np.int64(readings), np.int64(fast)
         x, moved, e, C = np.empty(n), np.empty(n), np.empty(n_sensor), np.empty(n_sensor)
         P, F, Q, work = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        H, g, gain, at = np.empty((n_sensor, n)), np.empty(n), np.empty(n), np.full(3, -1.0)
+        H, g, gain = np.empty((n_sensor, n)), np.empty(n), np.empty(n)
+        # What F and Q hold: the step of that node and share, and the noise of the sensors that are there.
+        placed, ending, present = -1, 0.0, -1
         node, share, before_it, F_between, Q_between = clocked
         Q[:] = Q_in[progress[PRESENT]]
         K, C_settled, settled, before = cycle
@@ -671,15 +660,18 @@ def settling_kernel(n: int, n_sensor: int, n_slow: int = 0) -> Any:  # noqa: PLR
             there = progress[PRESENT]
             if progress[STARTED] > 0:
                 if node.size > 0:
-                    tables = (F_between, Q_between[there])
-                    at[0] = at[0] if at[2] == there else -1.0
                     if before_it[k] > 0:
-                        reach_step(F, Q, NODES, 0.0, tables, at, n, core)
+                        between(F, F_between, NODES, 0.0, n, core)
+                        between(Q, Q_between[there], NODES, 0.0, n, core)
                         coast_toward(x, P, F, Q, reach, work, moved, g, n, core, last, before_it[k])
-                    reach_step(F, Q, node[k], share[k], tables, at, n, core)
-                elif at[2] != there:
+                        placed = -1
+                    if node[k] != placed or share[k] != ending or there != present:
+                        between(F, F_between, node[k], share[k], n, core)
+                        between(Q, Q_between[there], node[k], share[k], n, core)
+                        placed, ending = node[k], share[k]
+                elif present != there:
                     Q[:] = Q_in[there]
-                at[2] = there
+                present = there
                 move(x, F, reach, moved, n, core)
             if progress[MODE] == SETTLED:
                 whole = True
@@ -786,18 +778,20 @@ def judge_band(sensor):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def inflation(sensor, window, square, C):  # pragma: no cover
+def inflation(sensor, windows, i, square, C):  # pragma: no cover
     """Return S of (36): max(1, alpha C_hat / C), C_hat the mean (34) of `square` over the last readings."""
-    if sensor.alpha == 0.0:
-        return 1.0
-    at = sensor.window_count % window.size
-    sensor.window_sum += square - window[at]
-    window[at] = square
+    n_window = windows.shape[1]
+    at = sensor.window_count % n_window
+    sensor.window_sum += square - windows[i, at]
+    windows[i, at] = square
     sensor.window_count += 1
-    if at == window.size - 1:
+    if at == n_window - 1:
         # Once a lap the sum is formed anew: the rounding left by one huge innovation must not stay for ever.
-        sensor.window_sum = window.sum()
-    mean = sensor.window_sum / min(sensor.window_count, window.size)
+        total = 0.0
+        for m in range(n_window):
+            total += windows[i, m]
+        sensor.window_sum = total
+    mean = sensor.window_sum / min(sensor.window_count, n_window)
     return max(1.0, sensor.alpha * mean / C)
 
 
@@ -830,30 +824,16 @@ def adapt_offset(sensor, e):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def observe(sensor, window, e, spread, z, row):  # pragma: no cover
-    """Prepare the use of the reading z with the innovation e (11) and spread H P H': N_k, band, R and S; fill its `row`
-    of diagnostics.
+def observe(sensor, e, z):  # pragma: no cover
+    """Prepare the use of the reading z with the innovation e (11): N_k, band and R.
 
-    Return the square that stands for e e' in (17) and (34) (NaN if there is no difference yet), and S R.
+    Return the square that stands for e e' in (17) and (34), NaN if there is no difference yet.
     """
     watch_increments(sensor, z)
     judge_band(sensor)
     if sensor.follow and sensor.increments > 0:
         set_R(sensor, sensor.increment_variance)
-    square = e * e
-    if sensor.difference:
-        square = 0.5 * (e - sensor.previous_innovation) ** 2
-    C = spread + sensor.R
-    factor = 1.0
-    if np.isfinite(square):
-        factor = inflation(sensor, window, square, C)
-    row[INNOVATION] = e
-    row[INNOVATION_VARIANCE] = C
-    row[R_USED] = sensor.R
-    row[INCREMENTS] = sensor.increment_variance if sensor.increments > 0 else np.nan
-    row[BAND] = sensor.band if sensor.band >= 0 else np.nan
-    row[INFLATION] = factor
-    return square, factor * sensor.R
+    return 0.5 * (e - sensor.previous_innovation) ** 2 if sensor.difference else e * e
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -907,8 +887,8 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
         e, spread, R = np.empty(n_sensor, kind), np.empty(n_sensor, kind), np.empty(n_sensor, kind)
         square = np.empty(n_sensor)
         G, C, gain = np.empty((n_sensor, n), kind), np.empty((n_sensor, n_sensor), kind), np.empty((n, n_sensor), kind)
-        array, lost, at = np.empty((n, 2 * n), kind), np.empty(1, kind), np.full(2, -1.0)
-        node, share, whole, tables = clocked[0], clocked[1], clocked[2], clocked[3:]
+        array, lost = np.empty((n, 2 * n), kind), np.empty(1, kind)
+        node, share, whole, F_between, Q_between = clocked
         rows = core if form == JOSEPH else n
         x[:], P[:], F[:], Q[:], H[:] = x_in, P_in, F_in, Q_in, H_in
         reach, seen = np.empty((n, 2), np.int64), np.empty((n_sensor, 4), np.int64)
@@ -922,9 +902,11 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
             if node.size > 0:
                 stop = alike(node, share, whole, begin)
                 if progress[0] > 0.0 and whole[begin] > 0:
-                    reach_step(F, Q, NODES, 0.0, tables, at, n, rows)
+                    between(F, F_between, NODES, 0.0, n, rows)
+                    between(Q, Q_between, NODES, 0.0, n, rows)
                     coast(x, P, F, Q, reach, work, moved, g, array, G, gain, lost, due, n, core, form, whole[begin])
-                reach_step(F, Q, node[begin], share[begin], tables, at, n, rows)
+                between(F, F_between, node[begin], share[begin], n, rows)
+                between(Q, Q_between, node[begin], share[begin], n, rows)
             for k in range(begin, stop):
                 predicted = progress[0] > 0.0
                 if predicted:
@@ -955,7 +937,16 @@ def adaptive_kernel(n: int, n_sensor: int, form: int = JOSEPH, n_slow: int = 0) 
                         due[i], e[i] = False, kind.type(0.0)
                         continue
                     read = True
-                    square[i], R[i] = observe(sensors[i], windows[i], e[i], spread[i], Z[i, k], out[row:, k])
+                    square[i], factor = observe(sensors[i], e[i], Z[i, k]), 1.0
+                    if sensors[i].alpha != 0.0 and np.isfinite(square[i]):
+                        factor = inflation(sensors[i], windows, i, square[i], spread[i] + sensors[i].R)
+                    R[i] = factor * sensors[i].R
+                    out[row + INNOVATION, k], out[row + INNOVATION_VARIANCE, k] = e[i], spread[i] + sensors[i].R
+                    out[row + R_USED, k], out[row + INFLATION, k] = sensors[i].R, factor
+                    if sensors[i].increments > 0:
+                        out[row + INCREMENTS, k] = sensors[i].increment_variance
+                    if sensors[i].band >= 0:
+                        out[row + BAND, k] = sensors[i].band
                 if adapts_Q:
                     for j in range(n):
                         x_prior[j] = x[j]

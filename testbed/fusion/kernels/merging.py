@@ -14,6 +14,8 @@ from numba import njit
 from testbed.fusion.kernels.covariance import NODES
 from testbed.fusion.schedule import LARGEST_RATE
 
+# A stamp beyond all that are taken: nothing is due any more.
+NEVER = np.iinfo(np.int64).max
 # What is known of a sensor: nothing yet, its last reading, or that it has been silent for too long since.
 NOTHING, HEARD, OVERDUE = range(3)
 # So many of its periods after the last reading one is missing.
@@ -25,7 +27,7 @@ NEAR = 0.01
 
 
 @njit(cache=True, error_model="numpy")
-def merge_stamps(time, value, bounds, period, fastest, memory, out):  # pragma: no cover
+def merge_stamps(time, value, bounds, period, fastest, memory, out):  # noqa: PLR0912  # pragma: no cover
     """Fill `out` with the steps of a block, advance `memory`, and return how many there are.
 
     Parameters
@@ -49,16 +51,18 @@ def merge_stamps(time, value, bounds, period, fastest, memory, out):  # pragma: 
     _, last, known, late = memory
     Z, length, shown = out
     n_sensor, head, k = period.size, bounds[:-1].copy(), 0
+    patience, due = PATIENCE * period, np.full(n_sensor, NEVER)
     for i in range(n_sensor):
         while begun and head[i] < bounds[i + 1] and time[head[i]] < now:
             late[i] += 1
             head[i] += 1
+        if head[i] < bounds[i + 1]:
+            due[i] = time[head[i]]
     while True:
-        there, t = False, now
-        for i in range(n_sensor):
-            if head[i] < bounds[i + 1] and (not there or time[head[i]] < t):
-                there, t = True, time[head[i]]
-        if not there:
+        t = due[0]
+        for i in range(1, n_sensor):
+            t = min(t, due[i])
+        if t == NEVER:
             break
         taken = (t - now) / T if begun else 1.0
         if taken > LONGEST:
@@ -67,20 +71,21 @@ def merge_stamps(time, value, bounds, period, fastest, memory, out):  # pragma: 
             taken -= 1.0
             for i in range(n_sensor):
                 Z[i, k] = np.nan
-                if known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
+                if known[i] == HEARD and t - last[i] > patience[i]:
                     Z[i, k], known[i] = np.inf, OVERDUE
             k += 1
-        length[k], shown[k] = taken, False
+        length[k], shown[k] = taken, due[fastest] == t
         for i in range(n_sensor):
-            Z[i, k] = np.nan
-            if head[i] < bounds[i + 1] and time[head[i]] == t:
+            if due[i] == t:
                 z = value[head[i]]
                 Z[i, k] = z if abs(z) <= LARGEST_RATE else np.inf
-                shown[k] = shown[k] or i == fastest
                 head[i] += 1
+                due[i] = time[head[i]] if head[i] < bounds[i + 1] else NEVER
                 last[i], known[i] = t, HEARD
-            elif known[i] == HEARD and t - last[i] > PATIENCE * period[i]:
+            elif known[i] == HEARD and t - last[i] > patience[i]:
                 Z[i, k], known[i] = np.inf, OVERDUE
+            else:
+                Z[i, k] = np.nan
         begun, now = True, t
         k += 1
     memory[0][0], memory[0][1] = begun, now
@@ -107,16 +112,19 @@ def place_steps(length, node, share, whole):  # pragma: no cover
 @njit(cache=True, error_model="numpy")
 def show_steps(out, shown, first, pending, kept, begin):  # pragma: no cover
     """Set kept[:, begin:] = the columns of `out` that are shown; from row `first` on, where one is undefined, what the
-    columns before it gave that are not. `pending` (n_row,) is what the last ones leave for the next block.
+    columns before it gave that are not. `pending` (n_row,) is what the last ones leave for the next block; `out` is
+    left undefined.
     """
     for r in range(out.shape[0]):
-        held, at = pending[r], begin
-        for k in range(shown.size):
+        held, at = pending[r], np.uint64(begin)
+        for k in range(np.uint64(shown.size)):
             value = out[r, k]
+            out[r, k] = np.nan
+            held = held if np.isnan(value) else value
             if shown[k]:
-                kept[r, at] = held if np.isnan(value) else value
+                kept[r, at] = held
                 held = np.nan
-                at += 1
-            elif r >= first and not np.isnan(value):
-                held = value
+                at += np.uint64(1)
+            elif r < first:
+                held = np.nan
         pending[r] = held

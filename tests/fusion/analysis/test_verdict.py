@@ -244,6 +244,24 @@ def test_a_unit_that_was_said_wrong_is_told_from_all_others(moving, said, wrote,
     assert f"it reads in {wrote}, not in {said}: divide its readings by {factor:.6g}" in str(found.findings[0])
 
 
+def test_words_that_are_coarser_than_believed_are_not_told_to_be_stuck(rng):
+    """Words of 0.07 deg/s, five standard deviations of the noise, under a belief of fine ones: filters miss most."""
+    belief = load_belief({"g": {"numerator": [1.0], "denominator": [1.0], "output_noise": 1.7e-5, "resolution": 1e-8}})
+    word, n = 0.07 * DEG, 20_000
+    z = np.rint((2.4e-4 * rng.standard_normal(n) + 0.45 * word) / word) * word
+    stamps = {"g": np.arange(n) * 5_000_000}
+    (found,) = verdict({"g": z}, stamps, belief).findings
+    assert found.kind == "repeats"
+    assert "all are words of 0.07 deg/s, so believe that resolution" in str(found)
+    coarse = {"g": belief["g"].model_copy(update={"resolution": word})}
+    assert verdict({"g": z}, stamps, coarse).findings == ()
+    # Words of two standard deviations repeat each other some dozen times, and not 4000 times.
+    z = np.rint(2.4e-4 * rng.standard_normal(n) / 4.8e-4) * 4.8e-4
+    assert "believe that resolution" in str(verdict({"g": z}, stamps, belief).findings[0])
+    z[5000:9000] = z[5000]
+    assert "mend what stuck" in str(verdict({"g": z}, stamps, belief).findings[0])
+
+
 def test_what_is_cut_off_at_the_end_of_the_range_is_neither_noise_nor_stuck():
     _, readings = record(ramped(lambda t: 40.0 * four(t)), DURATION, 7)
     limit = EQ39["mhd_ars"].range

@@ -174,9 +174,9 @@ def test_fading_memory_sees_a_late_change_and_the_literal_form_does_not(referenc
 def test_S_forgets_a_huge_innovation_within_two_windows() -> None:
     """A running sum alone would keep eps * 1e8 of it for ever."""
     n, square = 50, 1e-10
-    sensors, window = np.zeros(1, dtype=SENSOR), np.zeros(n)
+    sensors, windows = np.zeros(1, dtype=SENSOR), np.zeros((1, n))
     sensors["alpha"] = 0.5
-    S = [inflation(sensors[0], window, 1e8 if k == 60 else square, square / 8.0) for k in range(60 + 2 * n)]
+    S = [inflation(sensors[0], windows, 0, 1e8 if k == 60 else square, square / 8.0) for k in range(60 + 2 * n)]
     # alpha C_hat / C = 0.5 * 8, before the first lap is full too; eps times the lap's additions.
     np.testing.assert_allclose(S[:60], 4.0, rtol=1e-13)
     assert min(S[60 : 60 + n]) > 1e16
