@@ -68,6 +68,7 @@ def test_spectra_and_a_run_agree_within_five_percent(found, mirror):
     assert_allclose(one.values["rpe_urad.0.1"], run.rpe_urad["0.1"], rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.oracle
 def test_spectra_and_a_run_agree_from_an_unknown_start_with_a_wrong_belief(tmp_path):
     """The gains are those of the middle of what is judged; those of the fourth second make 3.8 times of it here."""
