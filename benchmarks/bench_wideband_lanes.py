@@ -26,6 +26,7 @@ from testbed.chain.truth import Truth
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters.wideband import Wideband, WidebandParameters
 from testbed.fusion.kernels.bank import admit, log_likelihood, start_again, weigh
+from testbed.fusion.kernels.covariance import JOSEPH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,7 +62,7 @@ def step_us(coloured: bool) -> float:
 @njit(error_model="numpy")  # type: ignore[untyped-decorator]
 def mix(x: Any, P: Any, score: Any, weight: Any, innovations: Any, spread: Any, out: Any) -> None:  # pragma: no cover
     """Do of each step of the bank what its filters have in common: gate, likelihoods, weights, estimate and claim."""
-    M, watch = np.int64(FILTERS), np.zeros(2)
+    M, watch, slower = np.int64(FILTERS), np.zeros(2), np.empty(FILTERS)
     for k in range(out.shape[1]):
         for m in range(M):
             score[m] *= 0.999
@@ -76,7 +77,7 @@ def mix(x: Any, P: Any, score: Any, weight: Any, innovations: Any, spread: Any, 
                 for m in range(M):
                     score[m] += log_likelihood(e[m], spread[m] + 1e-10, 10.0)
         weigh(score, weight, M)
-        start_again(x, P, score, 1e9, x.shape[0], M)
+        start_again(x, P, score, 1e9, slower, x.shape[0], M, JOSEPH)
         rate, variance = 0.0, 0.0
         for m in range(M):
             rate += weight[m] * x[0, m]

@@ -410,20 +410,26 @@ def weigh(score, weight, M):  # pragma: no cover
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def start_again(x, P, score, restart, n, M):  # pragma: no cover
+def start_again(x, P, score, restart, slower, n, M, form):  # pragma: no cover
     """Give the filters slower than the best one, and by exp(-restart) less likely, its state and covariance; `score`
-    ends at 0.
+    ends at 0. `slower` (M,) tells which, 1 or 0, and is overwritten.
     """
-    best = 0
+    best, behind = 0, 0.0
     for m in range(1, M):
         if score[m] > score[best]:
             best = m
-    for m in range(best):
-        if score[m] < -restart:
-            for j in range(n):
-                x[j, m] = x[j, best]
-                for k in range(n):
-                    P[j, k, m] = P[j, k, best]
+    for m in range(M):
+        slower[m] = 1.0 if m < best and score[m] < -restart else 0.0
+        behind += slower[m]
+    if behind > 0.0:
+        for j in range(n):
+            value = x[j, best]
+            for m in range(M):
+                x[j, m] = value if slower[m] > 0.0 else x[j, m]
+            for k in range(j + 1 if form == JOSEPH else n):
+                value = P[j, k, best]
+                for m in range(M):
+                    P[j, k, m] = value if slower[m] > 0.0 else P[j, k, m]
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -546,7 +552,7 @@ def bank_kernel(n: int, n_sensor: int, M: int, form: int = JOSEPH, n_slow: int =
                         else:
                             update_plain_bank(x, P, H[i], seen[i], R[i], e, spread, g, K, n, M)
                 weigh(score, weight, M)
-                start_again(x, P, score, setting[4], n, M)
+                start_again(x, P, score, setting[4], total, n, M, form)
             rate, variance, level = 0.0, 0.0, 0.0
             for m in range(M):
                 rate += weight[m] * x[0, m]
