@@ -50,7 +50,7 @@ def test_coefficients_and_delay_scatter_as_their_covariance_says(clock_std):
         "slope": -2j * np.pi * FREQ * np.linspace(0.0, 10.0, FREQ.size) * true,
     }
     total, n = 0.0, 0
-    for seed in range(2, 6):
+    for seed in range(6):
         fit = fit_model(measured(true, np.random.default_rng(seed), **clock))
         if fit.denominator.size != 3 or fit.free != 1 or not fit.delayed:
             continue
@@ -58,7 +58,7 @@ def test_coefficients_and_delay_scatter_as_their_covariance_says(clock_std):
         total += off @ np.linalg.solve(fit.covariance, off)
         n += off.size
     # Bayes' criterion takes one coefficient too many in about one fit of twenty, for each that it may.
-    assert n >= 4 * 3
+    assert n >= 4 * 4
     assert chi2.ppf(5e-5, n) < total < chi2.isf(5e-5, n)
 
 
