@@ -2,10 +2,12 @@
 
 `kalman_kernel`, `settling_kernel` and `adaptive_kernel` build one machine-code loop per (number of states, number of
 sensors): loops of constant length unroll. What they call is given these sizes as variables, so that numba compiles it
-once and not for every size; inlined into the loop they are constants again. The last `n_slow` states are those of slow
-noise: each moves by itself and enters the others, which in Joseph form is made use of. They close over integers only,
-which numba's disk cache keys by value, so that a second process loads and does not compile. That cache watches no other
-file than the kernel's own: what calls each other stays in one file, which is why this one is long.
+once and not for every size; inlined into the loop they are constants again. What is given arrays there has one way
+through it: with two, numba counts references to them, atomically, at each call.
+The last `n_slow` states are those of slow noise: each moves by itself and enters the others, which in Joseph form is
+made use of. The kernels close over integers only, which numba's disk cache keys by value, so that a second process
+loads and does not compile. That cache watches no other file than the kernel's own: what calls each other stays in one
+file, which is why this one is long.
 `testbed.fusion.kernels.bank` and `testbed.fusion.two_paths.kernel` share numbers with it but no code; who changes such
 a number touches those files too.
 
@@ -93,8 +95,7 @@ SENSOR = np.dtype(
 def between(M, table, j, s, n, rows):  # pragma: no cover
     """Set M = (1 - s) table[j] + s table[j + 1], which for covariances is one too: `rows` of it, and the diagonal.
 
-    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it. One
-    way through: where there were two, numba would count references to both arrays, at the cost of a step.
+    In Joseph form the states behind `core` need no more than their diagonal, and what enters the rows before it.
     """
     part, after = M.dtype.type(s), j + 1 if s > 0.0 else j
     for a in range(rows):
