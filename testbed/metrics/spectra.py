@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -59,6 +58,8 @@ class WelchDensity:
     """
 
     def __init__(self, sample_rate_hz: float, n_segment: int) -> None:
+        from scipy.signal import get_window
+
         if n_segment < SHORTEST_SEGMENT:
             msg = f"n_segment: expected at least {SHORTEST_SEGMENT} samples, got {n_segment}"
             raise ValueError(msg)

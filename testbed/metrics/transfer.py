@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
 from testbed.metrics.spectra import log_average
 
@@ -61,6 +60,8 @@ class TransferSums:
     """
 
     def __init__(self, sample_rate_hz: float, n_time: int, lines_hz: Sequence[float] = ()) -> None:
+        from scipy.signal import get_window
+
         n_segment = min(max(2 * n_time // 17, SHORTEST), LONGEST)
         self._window: FloatArray = get_window("blackmanharris", n_segment)
         self._pending = np.empty((2, n_segment))

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.fft import rfft
-from scipy.signal import get_window
 
 from testbed.pointing.inputs import NOISE, TRUTH, UNKNOWN
 
@@ -54,6 +53,8 @@ class BandSpectra:
     """
 
     def __init__(self, sample_rate_hz: float, n_segment: int) -> None:
+        from scipy.signal import get_window
+
         self._window: FloatArray = get_window("hann", n_segment)
         freq = np.arange(1, n_segment // 2 + 1) * (sample_rate_hz / n_segment)
         self._first = _band_starts(freq.size)
