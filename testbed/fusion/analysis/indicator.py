@@ -177,8 +177,9 @@ class _Energies:
         """Return readings less their fading mean: a filter leaves a line its frequency, and no constant remains."""
         there = np.isfinite(z)
         weight = self._fading[-1][0].process(there.astype(float))
-        total: FloatArray = self._fading[-1][1].process(np.where(there, z, 0.0))
-        return z - np.divide(total, weight, out=np.zeros(z.size), where=there)
+        total = self._fading[-1][1].process(np.where(there, z, 0.0))
+        level: FloatArray = np.divide(total, weight, out=np.zeros(z.size), where=there)
+        return z - level
 
     def choose(self, signal: FloatArray, increments: FloatArray) -> tuple[np.ndarray, FloatArray]:
         """Return the lag used (-1 for none) and the frequency [Hz]: the shortest long enough, or else the longest that
