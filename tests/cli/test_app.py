@@ -188,7 +188,7 @@ def test_schema_accepts_every_shipped_scenario_and_refuses_a_bad_one(tmp_path):
 
 
 # What takes long to load and only drawing, recording or single parts need.
-SELDOM = "scipy.signal scipy.stats scipy.interpolate rerun control matplotlib xarray asammdf"
+SELDOM = "scipy.signal scipy.stats scipy.interpolate rerun control matplotlib pandas xarray h5py h5netcdf"
 COMPUTING = f"numpy scipy numba mujoco pint {SELDOM}"
 
 
