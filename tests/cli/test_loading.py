@@ -9,11 +9,8 @@ from testbed.cli.loading import loading
 
 def test_the_search_for_garbage_rests_while_libraries_load_and_goes_on_afterwards():
     before = gc.get_freeze_count()
-    try:
-        with loading():
-            kept = [[] for _ in range(1000)]
-            assert not gc.isenabled()
-        assert gc.isenabled()
-        assert gc.get_freeze_count() >= before + len(kept)
-    finally:
-        gc.unfreeze()
+    with loading():
+        kept = [[] for _ in range(1000)]
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    assert gc.get_freeze_count() >= before + len(kept)
