@@ -3,10 +3,10 @@ sample is simulated, over `import numpy, scipy, mujoco, numba`. Both are the CPU
 by then, read within it: one has started Python, loaded the libraries, read and checked the scenario, loaded compiled
 functions and played 60 ms on trial for the forecast; the other has the four modules, of which scipy loads nothing else.
 
-Promise: at most 1.5 times. Also printed: the start stage by stage, and whole processes, from `--help` to a run of one
-simulated second with all outputs; what one more output or one more second adds is the difference. Everything was run
-once before, so that bytecode and compiled functions are cached; medians, and of the promise that of the ratios within
-each turn.
+Promise: at most 1.5 times. Also printed: the start stage by stage; whole processes, from `--help` to a run of one
+simulated second with all outputs; and where that run goes, by what each output and a further second add. Everything was
+run once before, so that bytecode and compiled functions are cached; medians, and of the promise that of the ratios
+within each turn.
 """
 
 from __future__ import annotations
@@ -49,15 +49,22 @@ STAGES = {
     "testbed.scenario.loader",
 }
 RUN = ("-m", "testbed", "run")
+METRICS, LONGER, NETCDF, RECORDING, ALL = (
+    "run of 1 s: metrics",
+    "run of 2 s: metrics",
+    "run of 1 s: metrics, netcdf",
+    "run of 1 s: metrics, netcdf, recording",
+    "run of 1 s: all, report too",
+)
 WHOLE = {
     "--help": ("-m", "testbed", "--help"),
     "list": ("-m", "testbed", "list"),
     "check": ("-m", "testbed", "check", "1s.yaml"),
-    "run of 1 s: metrics": (*RUN, "1s.yaml", "--outputs", "metrics"),
-    "run of 2 s: metrics": (*RUN, "2s.yaml", "--outputs", "metrics"),
-    "run of 1 s: metrics, netcdf": (*RUN, "1s.yaml", "--outputs", "metrics,netcdf"),
-    "run of 1 s: metrics, netcdf, recording": (*RUN, "1s.yaml", "--outputs", "metrics,netcdf,recording"),
-    "run of 1 s: all, report too": (*RUN, "1s.yaml"),
+    METRICS: (*RUN, "1s.yaml", "--outputs", "metrics"),
+    LONGER: (*RUN, "2s.yaml", "--outputs", "metrics"),
+    NETCDF: (*RUN, "1s.yaml", "--outputs", "metrics,netcdf"),
+    RECORDING: (*RUN, "1s.yaml", "--outputs", "metrics,netcdf,recording"),
+    ALL: (*RUN, "1s.yaml"),
 }
 
 
@@ -95,6 +102,19 @@ def stages(path: str) -> dict[str, float]:
     return spent
 
 
+def divided(start: float, whole: dict[str, float]) -> dict[str, float]:
+    """Return where a run of one second with all outputs goes, by differences [s]."""
+    second = whole[LONGER] - whole[METRICS]
+    return {
+        "start": start,
+        "a second of MuJoCo, sensors and filters": second,
+        "bounds and optimum, metrics, end": whole[METRICS] - start - second,
+        "run.nc": whole[NETCDF] - whole[METRICS],
+        "recording": whole[RECORDING] - whole[NETCDF],
+        "report": whole[ALL] - whole[RECORDING],
+    }
+
+
 def write_scenarios(folder: str) -> None:
     """Write the mixed scenario, cut to one and two seconds, and without what it expects."""
     text = (ROOT / "scenarios" / "mixed_0p5hz_10hz.yaml").read_text().split("expect:")[0]
@@ -114,15 +134,17 @@ def main(repeats: int = 5) -> None:
     start = ("-c", UNTIL_IT_RUNS, "run", "1s.yaml", "--outputs", "metrics")
     with tempfile.TemporaryDirectory() as folder:
         write_scenarios(folder)
-        starts, stage, whole = [], [], []
+        starts, stage, whole, parts = [], [], [], []
         for _ in range(repeats + 1):
             libraries, begun = (float(said(*command, cwd=folder)) for command in (("-c", LIBRARIES), start))
             starts.append({"import numpy, scipy, mujoco, numba": libraries, "start of the command": begun})
             stage.append(json.loads(said(__file__, "stages", "1s.yaml", cwd=folder)))
             whole.append({label: seconds(*command, cwd=folder) for label, command in WHOLE.items()})
+            parts.append(divided(begun, whole[-1]))
     show("until the work begins", starts)
     show("the start, stage by stage", stage)
     show("whole processes", whole)
+    show("a run of 1 s with all outputs", parts)
     ratio = statistics.median(begun / libraries for libraries, begun in (turn.values() for turn in starts[1:]))
     conclude(Promise("start of the command over the import of numpy, scipy, mujoco, numba [-]", 1.5, ratio))
 
