@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import njit
@@ -59,6 +59,45 @@ def _advance(x, Phi, Gamma, step, C, D, previous, u, y):  # type: ignore[no-unty
         previous = u[k]
         y[k] = total
     return previous
+
+
+@njit(cache=True)
+def _recur(b, a, u, z, y):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Set y = z_1 + b_0 u; z_i+ = z_(i+1) + b_i u - a_i y, none behind the last."""
+    last = z.size - 1
+    for k in range(u.size):
+        out = z[0] + b[0] * u[k]
+        for i in range(last):
+            z[i] = z[i + 1] + b[i + 1] * u[k] - a[i + 1] * out
+        z[last] = b[last + 1] * u[k] - a[last + 1] * out
+        y[k] = out
+
+
+class Recursion:
+    r"""A difference equation, whose state is kept between calls (transposed direct form II).
+
+    .. math:: y_k = \sum_{i=0}^n b_i u_{k-i} - \sum_{i=1}^n a_i y_{k-i}
+
+    Parameters
+    ----------
+    b : ndarray, shape (n + 1,)
+        Coefficients of the input, newest first, real or complex [-].
+    a : ndarray, shape (m,)
+        Those of the output, m at most n + 1; the first is 1, what is missing 0 [-].
+    """
+
+    def __init__(self, b: FloatArray | ComplexArray, a: FloatArray | ComplexArray) -> None:
+        # NumPy's promotion: complex if one of them is.
+        kind = np.result_type(b, a, float)
+        self._b, self._a = np.asarray(b, kind), np.zeros(len(b), kind)
+        self._a[: len(a)] = a
+        self.state = np.zeros(len(b) - 1, kind)
+
+    def process(self, u: FloatArray) -> Any:
+        """Return the output, shape (n_time,), unit of `u`; at rest before the first, unless `state` was set."""
+        y = np.empty(u.size, self._b.dtype)
+        _recur(self._b, self._a, np.ascontiguousarray(u), self.state, y)
+        return y
 
 
 class LinearFilter:

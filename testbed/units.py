@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import pint
 from pydantic_core import PydanticCustomError, core_schema
 
 from testbed.errors import quoted
@@ -28,6 +27,7 @@ from testbed.errors import quoted
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    import pint
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 
 DEG = math.radians(1.0)  # rad
@@ -111,6 +111,8 @@ _ROOT = re.compile(r"sqrt(\((?:[^()]|\([^()]*\))*\))")
 
 @functools.cache
 def _registry() -> pint.UnitRegistry:
+    import pint
+
     registry = pint.UnitRegistry(None)
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from testbed.allan.freedom import CONFIDENCE, STRIDES, chi_square_limits, curve_exponents, equivalent_freedom
 
@@ -237,7 +237,7 @@ class _Problem:
         """Return term k with its interval."""
         square = float(squares[k])
         std = self._std(k, squares)
-        quantile = float(norm.ppf(0.5 + CONFIDENCE / 2.0))
+        quantile = float(ndtri(0.5 + CONFIDENCE / 2.0))
         if square > _DETECTION * std:
             low, high = chi_square_limits(squares[k : k + 1], np.array([2.0 * square**2 / std**2]))
             return Coefficient(float(np.sqrt(square)), float(np.sqrt(low[0])), float(np.sqrt(high[0])))
@@ -264,7 +264,7 @@ class _Problem:
         mean, mean_square = float(np.trace(product)), float(np.sum(product * product.T))
         reduced, freedom = float(residual @ residual) / mean, mean**2 / mean_square
         worst = float(self._tau[np.argmax(np.abs(residual))])
-        return Goodness(reduced, freedom, float(chi2.sf(reduced * freedom, freedom)), worst)
+        return Goodness(reduced, freedom, float(chdtrc(freedom, reduced * freedom)), worst)
 
     def _spread(self, model: FloatArray) -> FloatArray:
         """Return the standard deviations of the Allan variances if `model` is their expectation."""

@@ -6,7 +6,7 @@ import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -16,6 +16,21 @@ STRIDES = 64
 CONFIDENCE = 0.95
 # Averages below which the type of noise cannot be told.
 _AVERAGES = 30
+
+
+def chi_square_quantile(probability: float, freedom: FloatArray | float) -> FloatArray:
+    r"""Return the value that a chi square stays below: :math:`x = 2 P^{-1}(\nu / 2, p)`.
+
+    Parameters
+    ----------
+    probability : float
+        p [-].
+    freedom : float or ndarray, shape (n,)
+        Degrees of freedom nu [-].
+    """
+    # scipy.stats does the same, but takes a third of a second to load.
+    x: FloatArray = np.asarray(2.0 * gammaincinv(0.5 * np.asarray(freedom), probability), np.float64)
+    return x
 
 
 def chi_square_limits(variance: FloatArray, edf: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -34,8 +49,8 @@ def chi_square_limits(variance: FloatArray, edf: FloatArray) -> tuple[FloatArray
         Lower and upper limits, unit of `variance`.
     """
     tail = (1.0 - CONFIDENCE) / 2.0
-    low: FloatArray = variance * edf / chi2.ppf(1.0 - tail, edf)
-    high: FloatArray = variance * edf / chi2.ppf(tail, edf)
+    low: FloatArray = variance * edf / chi_square_quantile(1.0 - tail, edf)
+    high: FloatArray = variance * edf / chi_square_quantile(tail, edf)
     return low, high
 
 

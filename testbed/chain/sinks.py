@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Protocol
 from testbed.chain.versions import versions
 from testbed.runs.attributes import provenance
 from testbed.runs.folder import SIGNALS
-from testbed.runs.netcdf import NetcdfStore
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +55,8 @@ def open_sinks(
     """
     sinks: list[Sink] = []
     if "netcdf" in outputs:
+        from testbed.runs.netcdf import NetcdfStore
+
         attributes = provenance(scenario.name, scenario.frame.seed, versions())
         netcdf = NetcdfStore(folder / SIGNALS, chain.rates, scenario.frame.duration, attributes, chain.times)
         stack.callback(netcdf.close)

@@ -2,38 +2,42 @@
 
 from __future__ import annotations
 
-import importlib
+import ast
+import importlib.util
 import inspect
 import re
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
 from testbed.cli.console import terminal
-from testbed.compensation import LITERATURE
-from testbed.compensation.model_only import METHODS
+from testbed.compensation import FITS, LITERATURE
 from testbed.fusion import FILTERS
 from testbed.inputs.plugins import Plugins, load_plugins, offered
-from testbed.models.motion import Motion
 from testbed.models.motions import MOTIONS
-from testbed.parts import resolve
-from testbed.pointing.parameters import Link, Mirror, Tracker, Window
 from testbed.reproduce import PAPERS
 from testbed.sensors import SENSORS
-from testbed.sensors.base import Sensor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 
 # Parts of a scenario's `pointing`.
-POINTING = {"tracker": Tracker, "mirror": Mirror, "windows": Window, "link": Link}
+POINTING = {
+    "tracker": "testbed.pointing.parameters:Tracker",
+    "mirror": "testbed.pointing.parameters:Mirror",
+    "windows": "testbed.pointing.parameters:Window",
+    "link": "testbed.pointing.parameters:Link",
+}
 _KINDS = {"motion": MOTIONS, "sensor": SENSORS, "filter": FILTERS}
 
 
 def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
     """Return every name with its summary, one finished sentence, by kind.
+
+    What is shipped is read, not imported: none of the libraries that it needs is loaded.
 
     Parameters
     ----------
@@ -47,10 +51,10 @@ def catalogue(plugins: Iterable[str] = ()) -> dict[str, dict[str, str]]:
         "sensor_presets": _heads("testbed.sensors", "presets"),
         "beliefs": _heads("testbed.fusion", "beliefs"),
         "band_sets": _heads("testbed.fusion", "bands"),
-        "pointing": {name: _summary(part) for name, part in POINTING.items()},
-        "drift_models": {name: _summary(fit) for name, (_, fit, _) in METHODS.items()},
-        "drift_methods": {name: _summary(resolve("method", name, LITERATURE)) for name in LITERATURE},
-        "papers": {name: _summary(importlib.import_module(module)) for name, module in PAPERS.items()},
+        "pointing": _shipped(POINTING),
+        "drift_models": _shipped(FITS),
+        "drift_methods": _shipped(LITERATURE),
+        "papers": _shipped(PAPERS),
     }
 
 
@@ -70,14 +74,17 @@ def print_catalogue(table: Mapping[str, Mapping[str, str]]) -> None:
 
 def _offered(kind: str, registry: Mapping[str, str], loaded: Plugins) -> dict[str, str]:
     return {
-        **{name: _summary(resolve(kind, name, registry)) for name in registry},
+        **_shipped(registry),
         **{name: f"Offered by {package}." for name, package in offered(kind).items()},
-        **{name: _summary(part) for name, part in loaded.classes() if _kind(part) == kind},
+        **{name: _summary(inspect.getdoc(part)) for name, part in loaded.classes() if _kind(part) == kind},
     }
 
 
 def _kind(part: type[Any]) -> str | None:
     """Return what a class of a plug-in is for a scenario; None if it is nothing."""
+    from testbed.models.motion import Motion
+    from testbed.sensors.base import Sensor
+
     if issubclass(part, Motion):
         return "motion"
     if issubclass(part, Sensor):
@@ -85,9 +92,24 @@ def _kind(part: type[Any]) -> str | None:
     return "filter" if hasattr(part, "process") else None
 
 
-def _summary(part: Any) -> str:
+def _shipped(registry: Mapping[str, str]) -> dict[str, str]:
+    """Return the summaries of parts that are registered as ``package.module:name``, or as modules."""
+    return {name: _summary(_docstring(*place.partition(":")[::2])) for name, place in registry.items()}
+
+
+def _docstring(module: str, name: str) -> str | None:
+    """Return the docstring of a module, or of what it defines as `name`, out of its source."""
+    spec = importlib.util.find_spec(module)
+    assert spec is not None
+    assert spec.origin is not None
+    source = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    defined = {part.name: part for part in source.body if isinstance(part, ast.ClassDef | ast.FunctionDef)}
+    return ast.get_docstring(defined[name] if name else source)
+
+
+def _summary(docstring: str | None) -> str:
     """Return the first paragraph of a docstring without its markup."""
-    paragraph = (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+    paragraph = (docstring or "").split("\n\n")[0].replace("\n", " ")
     return re.sub(r"(:\w+:)?`", "", paragraph)
 
 

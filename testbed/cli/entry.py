@@ -5,7 +5,9 @@ Nothing is imported here that takes time: whoever stops the command while the li
 
 from __future__ import annotations
 
+import atexit
 import errno
+import gc
 import os
 import signal
 import sys
@@ -27,6 +29,8 @@ _SHOW_CURSOR = "\x1b[?25h"
 def main() -> None:
     """Run the command line; errors become one clear message and the exit status of the contract."""
     stopped = _Stopped()
+    # At its end the interpreter would look for garbage in all libraries: a fifth of the time of a short command.
+    atexit.register(gc.freeze)
     try:
         from testbed.cli.speech import speak_any_encoding
 

@@ -2,6 +2,13 @@
 cycles, frozen, and sees temperature only.
 """
 
+# How each method of a trained model is fitted.
+FITS = {
+    "gradient": "testbed.compensation.training:fit_coloured",
+    "lssvm": "testbed.compensation.training:fit_lssvm",
+    "polynomial": "testbed.compensation.training:fit_polynomial",
+    "process": "testbed.compensation.training:fit_process",
+}
 # What stands in the place of a trained model and works on the record that it corrects: the paper's own protocol, and
 # the methods that its Table 2 compares it with.
 LITERATURE = {

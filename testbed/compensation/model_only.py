@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from testbed.compensation import training
+from testbed.compensation import FITS, training
 from testbed.compensation.document import FORMAT, VERSION, ModelDocument, seal_of, sealed
 from testbed.compensation.features import Features, Scaling
 from testbed.compensation.lssvm import Lssvm
 from testbed.compensation.polynomial import Polynomial
 from testbed.compensation.record import checked
 from testbed.errors import quoted
+from testbed.parts import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,12 +37,12 @@ MOST_DRIFT = 0.1
 # mount (12 K): 10 K cost at most a quarter more error over the first four hours, 20 K a half, 40 K the double
 # (benchmarks/fog_audit.py).
 START_MARGIN = 10.0
-# What each method is: the kind of machine, how it is fitted, and the features unless told otherwise.
-METHODS: dict[str, tuple[str, Fit, Features]] = {
-    "gradient": ("polynomial", training.fit_coloured, Features()),
-    "lssvm": ("lssvm", training.fit_lssvm, Features()),
-    "polynomial": ("polynomial", training.fit_polynomial, Features(lags=())),
-    "process": ("polynomial", training.fit_process, Features(plays=(3.0, 10.0))),
+# What each method of `FITS` is: the kind of machine, and the features unless told otherwise.
+METHODS: dict[str, tuple[str, Features]] = {
+    "gradient": ("polynomial", Features()),
+    "lssvm": ("lssvm", Features()),
+    "polynomial": ("polynomial", Features(lags=())),
+    "process": ("polynomial", Features(plays=(3.0, 10.0))),
 }
 
 
@@ -252,7 +253,8 @@ def train(
     if method not in METHODS:
         msg = f"method: expected one of {', '.join(METHODS)}, got {quoted(method)}"
         raise ValueError(msg)
-    kind, fit, own = METHODS[method]
+    kind, own = METHODS[method]
+    fit: Fit = resolve("method", method, FITS)
     chosen = own if features is None else features
     rows = training.gather(cycles, chosen, block=block, most=training.MOST_SUPPORT if kind == "lssvm" else None)
     fitted, error = fit(rows, seed)

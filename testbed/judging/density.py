@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.stats import chi2
+from scipy.special import chdtri
 
+from testbed.allan.freedom import chi_square_quantile
 from testbed.errors import Problem, ScenarioError, quoted
 from testbed.judging.allan_records import read
 from testbed.judging.allan_words import line_text
@@ -80,7 +81,8 @@ class RateDensityEstimate:
     @functools.cached_property
     def limits(self) -> tuple[float, float]:
         """Factors of the 95 % interval of a density [-]."""
-        return self.freedom / float(chi2.isf(_TAIL, self.freedom)), self.freedom / float(chi2.ppf(_TAIL, self.freedom))
+        low, high = chdtri(self.freedom, _TAIL), chi_square_quantile(_TAIL, self.freedom)
+        return self.freedom / float(low), self.freedom / float(high)
 
     @property
     def _power(self) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -232,7 +232,7 @@ class LineFit:
         if len(powers) < _LEAST_NEIGHBOURS:
             return None
         sigma = np.sqrt(2.0 * np.mean(powers)) / self._n
-        return float(student.ppf(0.975, 2 * len(powers)) * sigma)
+        return float(stdtrit(2 * len(powers), 0.975) * sigma)
 
     def _is_free(self, frequency: float, line: float, length: float) -> bool:
         """Return whether no other line, nor zero frequency, lies within a period of the record."""

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal.windows import dpss
 
 if TYPE_CHECKING:
     from testbed.signals import FloatArray
@@ -39,6 +38,8 @@ def multitaper_density(values: FloatArray, sample_rate_hz: float) -> tuple[Float
     ----------
     D. J. Thomson (1982), Proc. IEEE 70(9):1055-1096.
     """
+    from scipy.signal.windows import dpss
+
     total = np.zeros(values.size // 2 + 1)
     for taper in dpss(values.size, HALF_BANDWIDTH, TAPERS):
         spectrum = rfft(values * taper)

@@ -6,13 +6,43 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from testbed.signals import FloatArray
 
+# Weights of the cosines of a window.
+HANN = (0.5, 0.5)
+BLACKMAN_HARRIS = (0.35875, 0.48829, 0.14128, 0.01168)
 LONGEST_SEGMENT = 2**19
 SHORTEST_SEGMENT = 8
+
+
+def cosine_window(weights: Sequence[float], n: int) -> FloatArray:
+    r"""Return a periodic window :math:`w_k = \sum_m a_m \cos m (2 \pi k / n - \pi)`.
+
+    Parameters
+    ----------
+    weights : sequence of float
+        The a_m, which add up to 1 [-].
+    n : int
+        Samples, after which it repeats.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        From nearly 0 over 1 in the middle [-].
+
+    References
+    ----------
+    F. J. Harris (1978), Proc. IEEE 66(1):51-83.
+    """
+    turn = np.linspace(-np.pi, np.pi, n + 1)[:-1]
+    window = np.zeros(n)
+    for m, weight in enumerate(weights):
+        window += weight * np.cos(m * turn)
+    return window
 
 
 def segment_length(n_time: int) -> int:
@@ -62,7 +92,7 @@ class WelchDensity:
         if n_segment < SHORTEST_SEGMENT:
             msg = f"n_segment: expected at least {SHORTEST_SEGMENT} samples, got {n_segment}"
             raise ValueError(msg)
-        self._window: FloatArray = get_window("hann", n_segment)
+        self._window: FloatArray = cosine_window(HANN, n_segment)
         self._scale = 1.0 / (sample_rate_hz * float(np.sum(self._window**2)))
         self._pending = np.empty(n_segment)
         self._n_pending = 0

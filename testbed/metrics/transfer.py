@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
-from testbed.metrics.spectra import log_average
+from testbed.metrics.spectra import BLACKMAN_HARRIS, cosine_window, log_average
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,7 +61,7 @@ class TransferSums:
 
     def __init__(self, sample_rate_hz: float, n_time: int, lines_hz: Sequence[float] = ()) -> None:
         n_segment = min(max(2 * n_time // 17, SHORTEST), LONGEST)
-        self._window: FloatArray = get_window("blackmanharris", n_segment)
+        self._window: FloatArray = cosine_window(BLACKMAN_HARRIS, n_segment)
         self._pending = np.empty((2, n_segment))
         self._n_pending = self._n_segments = 0
         self._freq_hz: FloatArray = rfftfreq(n_segment, 1.0 / sample_rate_hz)

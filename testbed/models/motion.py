@@ -24,10 +24,12 @@ RateFunction = Callable[[FloatArray], FloatArray]
 class Motion(Part):
     """One term of the commanded motion.
 
-    `example` is how a scenario may write it: the schema offers it, and the contract tests run on it.
+    `example` is how a scenario may write it: the schema offers it, and the contract tests run on it. A term is
+    `lasting` if its parameters say all of it: no file may change what it plays.
     """
 
     example: ClassVar[dict[str, Any]] = {}
+    lasting: ClassVar[bool] = True
 
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the commanded rate [rad/s] as a pure function of time [s], shape (n_time,) -> (n_time,).

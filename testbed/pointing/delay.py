@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfilt
 
 from testbed.signals import FloatArray, LinearFilter
 
@@ -27,6 +26,8 @@ class DelayRegression:
     """
 
     def __init__(self, gains: tuple[float, float], sample_rate_hz: float) -> None:
+        from scipy.signal import butter
+
         self._sensitivity = LinearFilter([1.0, 0.0, 0.0], [1.0, *gains], sample_rate_hz)
         self._sos = butter(2, BAND_HZ, "bandpass", fs=sample_rate_hz, output="sos")
         self._state = np.zeros((len(self._sos), 2, 2))
@@ -42,6 +43,8 @@ class DelayRegression:
         settled : int
             Samples of the block that are not judged yet.
         """
+        from scipy.signal import sosfilt
+
         both = np.stack([error, self._sensitivity.process(rate)])
         passed, self._state = sosfilt(self._sos, both, zi=self._state)
         e, r = passed[:, settled:]

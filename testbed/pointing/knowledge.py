@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.fft import rfft
-from scipy.signal import get_window
 
+from testbed.metrics.spectra import HANN, cosine_window
 from testbed.pointing.inputs import NOISE, TRUTH, UNKNOWN
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class BandSpectra:
     """
 
     def __init__(self, sample_rate_hz: float, n_segment: int) -> None:
-        self._window: FloatArray = get_window("hann", n_segment)
+        self._window: FloatArray = cosine_window(HANN, n_segment)
         freq = np.arange(1, n_segment // 2 + 1) * (sample_rate_hz / n_segment)
         self._first = _band_starts(freq.size)
         count = np.diff(self._first, append=freq.size)

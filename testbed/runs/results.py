@@ -15,7 +15,6 @@ from testbed.runs.folder import ESSENTIAL, SIGNALS
 from testbed.runs.leftovers import heal
 from testbed.runs.metrics import RunMetrics, read_metrics
 from testbed.runs.outputs import writes
-from testbed.runs.reading import read_groups
 from testbed.runs.signals import NONE, Signals, kept
 
 if TYPE_CHECKING:
@@ -89,6 +88,8 @@ class RunRecord:
         if missing:
             problem = f"expected a run folder, but {', '.join(str(Path(folder) / name) for name in missing)} is missing"
             raise ScenarioError([Problem(problem, file=str(folder))])
+        from testbed.runs.reading import read_groups
+
         metrics, groups = read_metrics(path / "metrics.json"), read_groups(path / SIGNALS)
         for group in () if metrics.replay else ("commanded", "truth"):
             if group not in groups:

@@ -10,7 +10,6 @@ import numpy as np
 
 from testbed.errors import ScenarioError
 from testbed.models.motions import MOTIONS
-from testbed.models.motions.recorded import Recorded
 from testbed.models.turntable.servo import required_torque
 from testbed.signals import BLOCK
 
@@ -74,7 +73,7 @@ def command_peaks(scenario: Scenario) -> Peaks:
         scenario.turntable,
         scenario,
     )
-    lasting = all(kind in MOTIONS and not isinstance(motion, Recorded) for kind, motion in scenario.motion)
+    lasting = all(kind in MOTIONS and motion.lasting for kind, motion in scenario.motion)
     return _kept(asked) if lasting else _peaks(scenario)
 
 

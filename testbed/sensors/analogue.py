@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numba import njit
-from scipy.signal import lfilter
+
+from testbed.signals import Recursion
 
 if TYPE_CHECKING:
     from testbed.signals import ComplexArray, FloatArray
@@ -61,16 +62,11 @@ class OnePole:
 
     def __init__(self, pole_hz: float, sample_rate_hz: float) -> None:
         h = 2.0 * np.pi * pole_hz / sample_rate_hz
-        self._b = hold_coefficients(h)
-        self._a = np.array([1.0, -np.exp(-h)])
-        self._state = np.zeros(3)
+        self._recursion = Recursion(hold_coefficients(h), np.array([1.0, -np.exp(-h)]))
 
     def process(self, u: FloatArray) -> FloatArray:
         """Return the filtered samples, shape (n_time,), unit of `u`; at rest before the first."""
-        if not u.size:
-            return np.empty(0)
-        y: FloatArray
-        y, self._state = lfilter(self._b, self._a, u, zi=self._state)
+        y: FloatArray = self._recursion.process(u)
         return y
 
 
@@ -86,16 +82,16 @@ class LowPassStage:
     """
 
     def __init__(self, h: ComplexArray, weight: ComplexArray) -> None:
-        self._b = [w * hold_coefficients(each) for each, w in zip(h, weight, strict=True)]
-        self._a = [np.array([1.0, -np.exp(-each)]) for each in h]
-        self._state = [np.zeros(3, dtype=complex) for _ in h]
+        self._sections = [
+            Recursion(w * hold_coefficients(each), np.array([1.0, -np.exp(-each)]))
+            for each, w in zip(h, weight, strict=True)
+        ]
 
     def process(self, u: FloatArray) -> FloatArray:
         """Return the filtered samples, shape (n_time,), unit of `u`; at rest before the first."""
         y = np.zeros(u.size)
-        for i in range(len(self._b) if u.size else 0):
-            section, self._state[i] = lfilter(self._b[i], self._a[i], u, zi=self._state[i])
-            y += section.real
+        for section in self._sections:
+            y += section.process(u).real
         return y
 
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
-from scipy.signal import butter
 
 from testbed.errors import quoted
 from testbed.units import Quantity, parse
@@ -235,5 +234,7 @@ def butterworth(bandwidth: float, order: int) -> dict[str, Any]:
     """
     if order == 2:
         return {"corner": bandwidth, "damping": math.sqrt(0.5)}
+    from scipy.signal import butter
+
     numerator, denominator = butter(order, 2.0 * np.pi * bandwidth, analog=True)
     return {"numerator": tuple(map(float, numerator)), "denominator": tuple(map(float, denominator))}

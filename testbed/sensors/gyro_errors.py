@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field, field_validator
-from scipy.signal import lfilter
 
 from testbed.parts import Part
+from testbed.signals import Recursion
 from testbed.units import (
     Duration,
     Probability,
@@ -164,7 +164,7 @@ class Fir:
     """
 
     def __init__(self, weights: FloatArray) -> None:
-        self._weights, self._state = weights, np.zeros(max(weights.size - 1, 1))
+        self._weights, self._recursion = weights, Recursion(weights, np.ones(1))
         self._started = False
 
     def process(self, u: FloatArray) -> FloatArray:
@@ -173,11 +173,8 @@ class Fir:
             return u
         if not self._started:
             # Each delayed sum holds what is left of a constant's.
-            self._state, self._started = np.cumsum(self._weights[:0:-1])[::-1] * u[0], True
-        y: FloatArray
-        # With a second coefficient, though zero, below: a lone one would choose a convolution that depends on the
-        # block.
-        y, self._state = lfilter(self._weights, [1.0, 0.0], u, zi=self._state)
+            self._recursion.state[:], self._started = np.cumsum(self._weights[:0:-1])[::-1] * u[0], True
+        y: FloatArray = self._recursion.process(u)
         return y
 
 

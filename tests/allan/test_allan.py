@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from allantools import ci
 from scipy.signal import welch
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 from testbed.allan import AllanCurve, allan_deviation, fit_allan
 from testbed.allan.fit import judge_fit, term_variance
-from testbed.allan.freedom import equivalent_freedom
+from testbed.allan.freedom import chi_square_quantile, equivalent_freedom
 from testbed.sensors import load_preset
 from testbed.sensors.noise import GyroNoise, GyroTerms
 
@@ -75,6 +75,16 @@ def test_degrees_of_freedom_equal_allantools(alpha: int, n_angle: int) -> None:
         wanted = ci.edf_greenhall(alpha, 2, m, n_angle, overlapping=True, modified=False)
         # Both replace long sums by shorter ones; Greenhall and Riley give theirs as good to a few percent.
         assert equivalent_freedom(m, n_angle, alpha) == pytest.approx(wanted, rel=0.02)
+
+
+@pytest.mark.oracle
+def test_quantiles_of_chi_square_are_scipys() -> None:
+    freedom = np.geomspace(0.1, 1e6, 50)
+    for probability in (0.025, 0.975):
+        # The inverse of the incomplete gamma function, good to some roundings.
+        np.testing.assert_allclose(
+            chi_square_quantile(probability, freedom), chi2.ppf(probability, freedom), rtol=1e-13, atol=0.0
+        )
 
 
 @pytest.mark.oracle

@@ -187,15 +187,26 @@ def test_schema_accepts_every_shipped_scenario_and_refuses_a_bad_one(tmp_path):
         assert not validator.is_valid(yaml.load(GOOD.replace(old, new))), new
 
 
-def test_help_loads_no_heavy_library(tmp_path):
+# What takes long to load and only drawing, recording or single parts need.
+SELDOM = "scipy.signal scipy.stats scipy.interpolate rerun control matplotlib pandas xarray h5py h5netcdf"
+COMPUTING = f"numpy scipy numba mujoco pint {SELDOM}"
+
+
+@pytest.mark.parametrize(
+    ("words", "unwanted", "said"),
+    [
+        (["--help"], f"pydantic {COMPUTING}", "run"),
+        (["list"], COMPUTING, "wideband"),
+        (["check", "short.yaml"], SELDOM, "The scenario is valid"),
+        (["run", "short.yaml", "--outputs", "metrics"], SELDOM, "RMSE"),
+    ],
+)
+def test_a_command_loads_no_library_that_it_does_not_need(tmp_path, words, unwanted, said):
+    short_file(tmp_path)
     code = (
-        "import sys; sys.argv = ['testbed', '--help']\nfrom testbed.cli import main\ntry:\n    main()\nexcept "
-        "SystemExit:\n    pass\n"
-    )
-    code += (
-        "print([m for m in ('numpy', 'scipy', 'numba', 'mujoco', 'rerun', 'control', 'matplotlib', 'pydantic') "
-        "if m in sys.modules])"
+        f"import sys; sys.argv = ['testbed', *{words!r}]\nfrom testbed.cli import main\ntry:\n    main()\nexcept "
+        f"SystemExit:\n    pass\nprint([m for m in {unwanted.split()!r} if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
     assert result.stdout.splitlines()[-1] == "[]"
-    assert "run" in result.stdout
+    assert said in result.stdout

@@ -70,11 +70,15 @@ def test_a_method_of_inverses_refuses_a_delay(name):
         METHODS[name](belief, RATES, METHODS[name].Parameters())
 
 
+def shaped(numerator, denominator):
+    """Return a gyro with these dynamics and with the slow noise of the one that it stands for."""
+    slow = BELIEF["mems_gyro"].model_dump(include={"bias_instability", "rate_random_walk"})
+    return SensorBelief(numerator=numerator, denominator=denominator, input_noise=4e-5, output_noise=1e-6, **slow)
+
+
 SHAPES = {
-    "static": SensorBelief(numerator=(0.9,), denominator=(1.0,), input_noise=4e-5, output_noise=1e-6),
-    "equal poles": SensorBelief(
-        numerator=(0.9 * 3000.0**2,), denominator=np.poly([-3000.0, -3000.0]), input_noise=4e-5, output_noise=1e-6
-    ),
+    "static": shaped((0.9,), (1.0,)),
+    "equal poles": shaped((0.9 * 3000.0**2,), np.poly([-3000.0, -3000.0])),
 }
 
 
@@ -82,7 +86,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", NAMES)
 def test_a_gyro_without_dynamics_or_with_equal_poles_is_used(name, shape):
     """As well as the one with a single pole at the same place."""
-    single = SensorBelief(numerator=(2700.0,), denominator=(1.0, 3000.0), input_noise=4e-5, output_noise=1e-6)
+    single = shaped((2700.0,), (1.0, 3000.0))
     errors = []
     for gyro in (SHAPES[shape], single):
         readings, truth = moved(mems_gyro=gyro)

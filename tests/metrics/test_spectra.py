@@ -7,10 +7,18 @@ import tracemalloc
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.signal import welch
+from scipy.signal import get_window, welch
 from scipy.stats import chi2
 
-from testbed.metrics.spectra import LONGEST_SEGMENT, WelchDensity, log_average, segment_length
+from testbed.metrics.spectra import (
+    BLACKMAN_HARRIS,
+    HANN,
+    LONGEST_SEGMENT,
+    WelchDensity,
+    cosine_window,
+    log_average,
+    segment_length,
+)
 
 
 def density_of(x: np.ndarray, sample_rate_hz: float, n_segment: int) -> WelchDensity:
@@ -29,6 +37,14 @@ def test_welch_equals_scipy(n_segment: int):
     # Rounding of two FFTs: eps times log2(n), relative to the largest term.
     assert_allclose(ours.density, theirs[: n_segment // 2 + 1], rtol=1e-12, atol=1e-13 * theirs.max())
     assert_allclose(ours.freq_hz, np.arange(n_segment // 2 + 1) * 2000.0 / n_segment, rtol=1e-15)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("name", "weights"), [("hann", HANN), ("blackmanharris", BLACKMAN_HARRIS)])
+@pytest.mark.parametrize("n", [8, 255, 65536])
+def test_a_window_is_scipys(name: str, weights: tuple[float, ...], n: int):
+    # A cosine and a sum of four terms, each rounded.
+    assert_allclose(cosine_window(weights, n), get_window(name, n), rtol=0.0, atol=1e-15)
 
 
 @pytest.mark.property

@@ -24,9 +24,9 @@ Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Trained model (JSO
 
 
 def _methods(incomplete: str) -> list[str]:
-    from testbed.compensation.model_only import METHODS
+    from testbed.compensation import FITS
 
-    return [name for name in METHODS if name.startswith(incomplete)]
+    return [name for name in FITS if name.startswith(incomplete)]
 
 
 @app.command()

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from testbed.cli.loading import loading
 from testbed.cli.options import AllowOutside, Output, PluginModules, ScenarioFile, WantedOutputs, expanded
 from testbed.cli.status import MISSED
 from testbed.errors import Problem, RunError, ScenarioError
@@ -30,22 +31,26 @@ def run(
     allow_outside: AllowOutside = False,
 ) -> None:
     """Run a scenario, print its errors and write the run folder."""
-    from testbed.chain.forecast import forecast
-    from testbed.chain.runner import run as run_scenario
-    from testbed.cli.check_page import size_words, warnings
-    from testbed.cli.terminal import print_metrics
-    from testbed.logs.options import quantity
-    from testbed.runs.outputs import chosen
-    from testbed.scenario.loader import load_scenario
+    with loading():
+        from testbed.chain.forecast import forecast
+        from testbed.chain.runner import run as run_scenario
+        from testbed.cli.check_page import size_words, warnings
+        from testbed.cli.terminal import print_metrics
+        from testbed.logs.options import quantity
+        from testbed.runs.outputs import chosen
+        from testbed.scenario.loader import load_scenario
 
     wanted = chosen(None if outputs is None else [name.strip() for name in outputs.split(",")])
     if (view or live) and "recording" not in wanted:
         shows = "--live" if live else "--view"
         raise ScenarioError([Problem(f"{shows} shows the recording: add recording", "outputs")])
     length = None if block is None else quantity(block, "s", "20 ms", "--block")
-    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+    with loading():
+        loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     output.warn(warnings(loaded))
-    output.note(f"{loaded.name}: {size_words(forecast(loaded, wanted))}")
+    with loading():
+        size = forecast(loaded, wanted)
+    output.note(f"{loaded.name}: {size_words(size)}")
     target = out or Path("runs") / loaded.name
     with ExitStack() as stack:
         address, window = None, None
@@ -78,17 +83,19 @@ def check(
     allow_outside: AllowOutside = False,
 ) -> None:
     """Validate a scenario and print what was understood."""
-    from testbed.chain.forecast import forecast
-    from testbed.cli.check_page import print_page, size_document, warnings
-    from testbed.cli.understood import print_scenario, scenario_document
-    from testbed.judging.table_facts import table_facts
-    from testbed.scenario.departures import departures
-    from testbed.scenario.loader import load_scenario
+    with loading():
+        from testbed.chain.forecast import forecast
+        from testbed.cli.check_page import print_page, size_document, warnings
+        from testbed.cli.understood import print_scenario, scenario_document
+        from testbed.judging.table_facts import table_facts
+        from testbed.scenario.departures import departures
+        from testbed.scenario.loader import load_scenario
 
-    loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
+        loaded = load_scenario(scenario, plugins=plugin or (), allow_outside=allow_outside)
     output.warn(warnings(loaded))
     try:
-        size = forecast(loaded)
+        with loading():
+            size = forecast(loaded)
     except RunError as error:
         raise ScenarioError([Problem(f"the run would fail at its beginning: {error}", file=loaded.file)]) from error
     facts = table_facts(loaded, size.step)

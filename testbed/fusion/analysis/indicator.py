@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import lfilter
 
-from testbed.signals import BLOCK
+from testbed.signals import BLOCK, Recursion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -150,11 +149,12 @@ class _Energies:
         self._seconds = np.array(LAGS_S)
         self._noise = [noise_energies(belief, sample_rate_hz, lag) for lag in self.lags]
         self._margin = margin
-        self._keep = float(np.exp(-1.0 / (sample_rate_hz * memory)))
-        self._enough = ENOUGH / (1.0 - self._keep)
+        keep = float(np.exp(-1.0 / (sample_rate_hz * memory)))
+        self._enough = ENOUGH / (1.0 - keep)
         self._past = np.full(3 * self.lags[-1], np.nan)
         # Of the means of each lag, and of the readings: their values and how many there are.
-        self._memory = np.zeros((len(self.lags) + 1, 3, 1))
+        b, a = np.array([1.0, 0.0]), np.array([1.0, -keep])
+        self._fading = [[Recursion(b, a) for _ in range(3)] for _ in range(len(self.lags) + 1)]
 
     def process(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the corrected energies of signal and increments, shape (n_lag, n_time) [rad^2/s^2]; NaN before the
@@ -166,9 +166,9 @@ class _Energies:
         for i, (lag, noise) in enumerate(zip(self.lags, self._noise, strict=True)):
             pair = energies(z[self._past.size - 3 * lag :], lag)
             there = np.isfinite(pair[0]) & np.isfinite(pair[1])
-            weight = self._fade(i, 2, there.astype(float))
+            weight = self._fading[i][2].process(there.astype(float))
             for j in range(2):
-                total = self._fade(i, j, np.where(there, pair[j], 0.0))
+                total = self._fading[i][j].process(np.where(there, pair[j], 0.0))
                 means[j, i] = np.divide(total, weight, out=np.full(n, np.nan), where=weight > self._enough) - noise[j]
         self._past = z[n:]
         return means[0], means[1]
@@ -176,13 +176,10 @@ class _Energies:
     def _less_level(self, z: FloatArray) -> FloatArray:
         """Return readings less their fading mean: a filter leaves a line its frequency, and no constant remains."""
         there = np.isfinite(z)
-        weight = self._fade(len(self.lags), 0, there.astype(float))
-        total = self._fade(len(self.lags), 1, np.where(there, z, 0.0))
-        return z - np.divide(total, weight, out=np.zeros(z.size), where=there)
-
-    def _fade(self, lag: int, which: int, values: FloatArray) -> FloatArray:
-        faded, self._memory[lag, which] = lfilter([1.0], [1.0, -self._keep], values, zi=self._memory[lag, which])
-        return np.asarray(faded)
+        weight = self._fading[-1][0].process(there.astype(float))
+        total = self._fading[-1][1].process(np.where(there, z, 0.0))
+        level: FloatArray = np.divide(total, weight, out=np.zeros(z.size), where=there)
+        return z - level
 
     def choose(self, signal: FloatArray, increments: FloatArray) -> tuple[np.ndarray, FloatArray]:
         """Return the lag used (-1 for none) and the frequency [Hz]: the shortest long enough, or else the longest that

@@ -8,11 +8,15 @@ lane while they are worked on, a part of the block at a time that stays in the p
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from testbed.fusion.lanes import moving
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,37 +29,16 @@ GATE = 1000.0
 MEMORY = ("R", "lowest", "highest", "hits", "innovation", "reading", "increment", "window", "band")
 # Steps that are worked on at a time: a number of each lane takes 32 kB for them.
 PART = 256
-# Unsigned places in what moves readings and estimates: a signed one would be looked at, whether it counts from the end.
+# Numba's disk cache watches the generated file alone, so that this changes with what it calls, too.
 HEAD = f"""\
 from math import sqrt
 
 import numpy as np
 from numba import njit
 
+from testbed.fusion.lanes.moving import collect, first_of, spread
 
-@njit(cache=True, forceinline=True, error_model="numpy")
-def first_of(due):
-    for k in range(due.size):
-        if due[k]:
-            return k
-    return due.size
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def spread(Z, i, begin, n, first, stride, z):
-    for s in range({LANES}):
-        own = Z[s]
-        for m in range((n - first + stride - 1) // stride):
-            k = np.uint64(first + m * stride)
-            z[k, s] = own[i, np.uint64(begin) + k]
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def collect(part, first, stride, found):
-    for s in range(found.shape[0]):
-        for m in range((found.shape[1] - first + stride - 1) // stride):
-            k = np.uint64(first + m * stride)
-            found[s, k] = part[k, s]
+# {hashlib.sha256(inspect.getsource(moving).encode()).hexdigest()}
 
 
 @njit(cache=True, error_model="numpy")

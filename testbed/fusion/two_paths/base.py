@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import minimize_scalar
 
 from testbed.errors import quoted
 from testbed.fusion.base import BlockFilter, CommonParameters, Rows
@@ -335,6 +334,7 @@ def _best_alone(
     `come` is how its readings come at the sine, over the model that is inverted [-]. Its poles are two more than the
     inverse needs, so that the steps of readings that are held do not come through.
     """
+    from scipy.optimize import minimize_scalar
 
     def band_of(bandwidth_hz: float) -> tuple[FloatArray, FloatArray]:
         excess = slow.n_state - np.trim_zeros(np.array(slow.numerator), "f").size + 1
@@ -353,6 +353,7 @@ def _best_alone(
 
 def _best_bandwidth(candidate: Callable[[float], FloatArray], sample_rate_hz: float) -> float:
     """Return the bandwidth with the least mean square error [Hz], up to a quarter of the sample rate."""
+    from scipy.optimize import minimize_scalar
 
     def error(log_f: float) -> float:
         return math.log(candidate(math.exp(log_f)).mean())

@@ -14,8 +14,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.signal import buttap
 
 from testbed.fusion.belief import SensorBelief
 
@@ -43,6 +41,8 @@ def low_pass(order: int, w: float, poles: int | None = None) -> tuple[FloatArray
     poles : int, optional
         Their number [-]; `order` if not given, more make L fall faster.
     """
+    from scipy.signal import buttap
+
     n = poles or order
     a = np.real(np.poly(buttap(n)[1])) * w ** np.arange(n + 1)
     return a[-order:], a
@@ -112,6 +112,8 @@ def best_crossover(slow: SensorBelief, fast: SensorBelief, order: int, freq_hz: 
     freq_hz, lag : float, optional
         A sine [Hz], and how the slow path by itself errs there, in mean square [rad^2/s^2].
     """
+    from scipy.optimize import minimize_scalar
+
     freq = np.logspace(math.log10(LOW_HZ), math.log10(HIGH_HZ), 801)
     s = 2j * np.pi * freq
     of_slow, of_fast = input_psd(slow)(freq), input_psd(fast)(freq)

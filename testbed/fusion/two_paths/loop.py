@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,6 +92,8 @@ def shaped_loop(
     Dehaeze, Verma, Collette, "Complementary filters shaping using H-infinity synthesis", Int. Conf. Control,
     Mechatronics and Automation (2019) (the same norm, over filters of any order: `examples/shaped_blends.py`).
     """
+    from scipy.optimize import minimize, minimize_scalar
+
     freq = np.geomspace(SHAPED_FROM_HZ, SHAPED_TO_HZ, _POINTS)
     s = 2j * np.pi * freq
     of_slow, of_fast, late = slow_psd(freq), fast_psd(freq), lag(freq)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, FieldSerializationInfo, ValidationInfo, field_serializer, model_validator
-from scipy.interpolate import CubicSpline
 
 from testbed import units
 from testbed.errors import Problem, ScenarioError
@@ -84,6 +83,7 @@ class Recorded(Motion):
         "time": {"column": "t", "unit": "s"},
         "rate": {"column": "w", "unit": "deg/s"},
     }
+    lasting = False
 
     file: Annotated[Path, AfterValidator(_beside_scenario)]
     time: Column
@@ -123,6 +123,8 @@ class Recorded(Motion):
 
     def start(self, duration: float, rng: np.random.Generator) -> RateFunction:
         """Return the rate [rad/s] as a function of time [s]; ScenarioError if the record is shorter than `duration`."""
+        from scipy.interpolate import CubicSpline
+
         t, rate = self._read()
         if t[-1] - t[0] < duration:
             msg = f"the record lasts {t[-1] - t[0]:g} s, shorter than the run's {duration:g} s: shorten duration"

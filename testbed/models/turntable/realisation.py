@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
-from scipy.interpolate import BSpline
 
 from testbed.errors import ScenarioError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from scipy.interpolate import BSpline
 
     from testbed.models.motion import RateFunction
     from testbed.signals import ComplexArray, FloatArray
@@ -40,6 +40,8 @@ def grid(band: tuple[float, float], duration: float) -> tuple[float, int]:
     ScenarioError
         If these are more than `MOST_POINTS`.
     """
+    from scipy.fft import next_fast_len
+
     low, high = band
     period = max(1.05 * duration, _LEAST_LINES / (high - low))
     points = _OVERSAMPLING * high * period
@@ -69,6 +71,8 @@ def periodic_spline(lines: ComplexArray, n: int, period: float) -> BSpline:
     period : float
         Period [s].
     """
+    from scipy.interpolate import BSpline
+
     theta = 2.0 * np.pi / n * np.arange(n // 2 + 1)
     lines /= (66.0 + 52.0 * np.cos(theta) + 2.0 * np.cos(2.0 * theta)) / 120.0
     coefficients = np.fft.irfft(lines, n)
