@@ -4,6 +4,7 @@ that have it, whatever their seeds.
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -35,10 +36,14 @@ if TYPE_CHECKING:
 # Steps after which packs of covariances are filled up.
 _CLOSED = 16
 _JIT = '@njit(cache=True, error_model="numpy")'
+# Numba's disk cache watches the generated file alone, so that this changes with what it calls, too.
 _HEAD = f"""\
 import numpy as np
 from numba import njit
 
+from testbed.fusion.lanes.heirs import change, close_ranks
+
+# {hashlib.sha256(inspect.getsource(heirs).encode()).hexdigest()}
 LANES = {LANES}
 """
 # A step of its own before the first reading, where nothing moves. In W[p] stand the filters of a pack of seeds, one
@@ -145,8 +150,7 @@ def bank_source(pattern: Pattern, n_slow: int, n_filter: int) -> BankSource:
     bank = bank_rows(pattern, n_filter)
     functions = [*covariance_functions(pattern, n_slow), _states(pattern, bank)]
     functions += mixture_functions(bank, len(pattern.H))
-    text = _HEAD + "".join(f"\n\n{inspect.getsource(one.py_func)}" for one in heirs.FUNCTIONS)
-    text += "".join(f"\n\n{_JIT}\n{one}\n" for one in functions)
+    text = _HEAD + "".join(f"\n\n{_JIT}\n{one}\n" for one in functions)
     kept = len(covariance_names(pattern.n))
     text += _RUN.format(
         width=LANES * len(bank.names),

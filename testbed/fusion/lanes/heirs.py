@@ -1,5 +1,5 @@
 """Covariances that filters of a bank share under LANES seeds side by side, and go on with when they start again from a
-better one: source of the kernels of `testbed.fusion.lanes.bank_source`.
+better one: what the kernels of `testbed.fusion.lanes.bank_source` call.
 
 A covariance stands once for all filters that have it. `C` (n_pack, n_row * LANES) are the covariances: first what an
 heir takes over, then its own noise. `of` (M, LANES) tells which one a filter has under each seed, `users`
@@ -94,6 +94,3 @@ def close_ranks(C, n_row, of, users, live, counted):  # pragma: no cover
     for k in range(numbers.size):
         if moved[numbers[k]] >= 0:
             numbers[k] = moved[numbers[k]]
-
-
-FUNCTIONS = (born, release, change, close_ranks)

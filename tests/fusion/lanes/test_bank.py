@@ -10,7 +10,7 @@ import pytest
 from testbed.fusion.belief import default_belief
 from testbed.fusion.filters.wideband import Wideband, WidebandParameters
 from testbed.fusion.kernels.covariance import LOST_VARIANCE
-from testbed.fusion.lanes import bank, heirs
+from testbed.fusion.lanes import heirs
 from testbed.fusion.lanes.bank import BANKS_AT_ONCE, FEWEST
 from testbed.fusion.lanes.source import LANES
 from testbed.fusion.lanes.together import Together
@@ -191,10 +191,3 @@ def test_heirs_of_one_parent_at_one_step_are_one(rng):
         born_at = whole[of // LANES, 1, of % LANES].copy()
     # All that have one covariance at last came from one parent at one step.
     assert len({(m, founder[p, m, s], born_at[p, m, s]) for p, m, s in np.ndindex(of.shape)}) == np.unique(of).size
-
-
-def test_what_is_generated_has_the_functions_that_are_tested():
-    """The module stands alone: numba would go on with what it kept of a function that is imported."""
-    source = bank.bank_source(bank.pattern_of(banks(1, **FEW)[0]), 1, 3).text
-    assert all(f"def {one.py_func.__name__}(" in source for one in heirs.FUNCTIONS)
-    assert "testbed" not in source.replace("`testbed.", "")
