@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -14,6 +15,9 @@ import numpy as np
 import pytest
 
 from testbed.cli.loading import loading
+
+# What is left at the end is left to the system: nothing in it is searched for once more.
+atexit.register(gc.freeze)
 
 # Started in the background by a shell, this process ignores Ctrl-C, and so would every command that a test interrupts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
