@@ -46,8 +46,8 @@ class Size:
 
 
 def warm(study: Study) -> None:
-    """Play the first moments of the first and the last case, so that what they compile stands in the cache that workers
-    read, and counts for no case.
+    """Play the first moments of the first and the last case under the seeds of one task, so that what they compile
+    stands in the cache that workers read, and counts for no case.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def warm(study: Study) -> None:
     # A case that fails is a row with its reason, which whoever plays it writes.
     with contextlib.suppress(Exception):
         for case in _ends(study):
-            _tried(case.scenario, study.seeds[:1])
+            _tried(case.scenario, study.seeds[:CHUNK])
 
 
 def size_of(study: Study, workers: int = 1) -> Size:
