@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from testbed.scenario.model import Scenario
     from testbed.signals import FloatArray
 
-# Seeds whose signals of a block are there at a time.
+# Seeds whose signals of a block are there at a time, unless more of them go faster together.
 _PACK = 16
 
 
@@ -61,7 +61,8 @@ class Lockstep:
         self._order = [number for numbers in fronts.values() for number in numbers]
         # Lanes go fastest where their buffers stay; others are slow enough to have the room instead, unless what stands
         # in them is for further seeds of this block.
-        self._makes_room = len(seeds) <= _PACK and not all(stage.in_lanes for _, stage in self._filters)
+        self._pack = max([_PACK, *(stage.at_once for _, stage in self._filters)])
+        self._makes_room = len(seeds) <= self._pack and not all(stage.in_lanes for _, stage in self._filters)
         rates = [sample_rates(case) for case in cases]
         self._common = [CaseFacts(case, rate, self._truth.step) for case, rate in zip(cases, rates, strict=True)]
         self._sights = {
@@ -104,8 +105,8 @@ class Lockstep:
             case.write(block)
         for _, sensor in self._sensors:
             sensor.take(truth)
-        for k in range(0, len(self._seeds), _PACK):
-            self._judge(block, self._seeds[k : k + _PACK])
+        for k in range(0, len(self._seeds), self._pack):
+            self._judge(block, self._seeds[k : k + self._pack])
 
     def _judge(self, block: RunBlock, pack: Sequence[int]) -> None:
         """Judge some seeds: their readings, then one filter after the other, then what all of them leave of the line

@@ -105,14 +105,14 @@ class ManyFilters:
         self._shipped = spec.type in FILTERS
         # Filters with an equal one receive the same of equal readings; None has what nobody else has.
         self.front: Any = None
-        self.in_lanes = False
+        self.in_lanes, self.at_once = False, 1
         if self._shipped:
             rates = {sensor: part.sample_rate for sensor, part in scenario.sensors.items()}
             first = spec.start(rates)
             # Some design their gains before they start.
             self._stages = {seed: deepcopy(first) for seed in seeds}
             self._together = Together(first, buffers)
-            self.in_lanes = self._together.in_lanes
+            self.in_lanes, self.at_once = self._together.in_lanes, self._together.at_once
             self._onsets = {seed: Onset(scenario) for seed in seeds if scenario.frame.fusion_from}
             self.front = None if self._onsets else first.front()
         else:

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import testbed
 from testbed.fusion import FILTERS
+from testbed.fusion.filters.wideband import Wideband
 from tests.scenario.test_loader import SCENARIOS
 from tests.scenes import short, short_file
 
@@ -112,6 +113,19 @@ def test_metrics_are_those_of_a_run_whatever_the_instruments(tmp_path, gyro, mhd
         **{"turntable.engine": "mujoco" if exposed else engine},
     )
     agrees(scenario, [seed, seed + 1])
+
+
+def test_banks_go_side_by_side_with_other_filters(tmp_path, monkeypatch):
+    """More seeds than the others take at a time, in buffers that all share; none of them by itself."""
+    few = {"filters": 2, "decades": 9.0, "order": 2, "q": "1e-2 rad^2/s^5", "coloured": False}
+    filters = {"wideband": few, "kalman": {"coloured": False}, "arw_shakf": {}}
+    changes = {"duration": "0.1 s", "settle": "0.05 s", "turntable.engine": "modal", "fusion": filters, "expect": None}
+    scenario = short(tmp_path).with_(**changes)
+    expected = [of_run(scenario, seed) for seed in (1, 18)]
+    monkeypatch.setattr(Wideband, "_advance", None)
+    found = testbed.evaluate(scenario, range(1, 19))
+    for ours, theirs in zip((found[0], found[-1]), expected, strict=True):
+        assert list(differences(ours.to_dict(), theirs)) == []
 
 
 @pytest.mark.parametrize("rails", [None, MHD["saturation"]])

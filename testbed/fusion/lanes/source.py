@@ -234,6 +234,19 @@ def load(rows: Workspace, names: Iterable[str]) -> Iterator[str]:
     return (f"{name} = {rows.at(name)}" for name in names)
 
 
+def function(head: str, lines: Iterable[str]) -> str:
+    """Return the source of a function.
+
+    Parameters
+    ----------
+    head : str
+        Its name and arguments.
+    lines : iterable of str
+        Its body.
+    """
+    return "\n".join([f"def {head}:", *lines])
+
+
 def matrices_of(pattern: Pattern) -> Iterator[str]:
     """Yield F and H as plain variables.
 

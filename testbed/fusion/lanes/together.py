@@ -12,11 +12,14 @@ import numpy as np
 from testbed.fusion.filters.kalman import Kalman
 from testbed.fusion.filters.shakf import SageHusa
 from testbed.fusion.filters.steady_state import SteadyState
+from testbed.fusion.filters.wideband import Wideband
 from testbed.fusion.kernels.covariance import JOSEPH
 from testbed.fusion.lanes.adaptive import AdaptiveLanes
+from testbed.fusion.lanes.bank import BANKS_AT_ONCE, BankLanes
 from testbed.fusion.lanes.pack import Buffers
 from testbed.fusion.lanes.settling import SettlingGains
 from testbed.fusion.lanes.shared import KalmanGains, SharedLanes
+from testbed.fusion.lanes.source import LANES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -41,7 +44,7 @@ class Together:
     """
 
     def __init__(self, example: BlockFilter, buffers: Buffers | None = None) -> None:
-        self._lanes: SharedLanes | AdaptiveLanes | None = None
+        self._lanes: SharedLanes | AdaptiveLanes | BankLanes | None = None
         buffers = buffers or Buffers()
         if isinstance(example, Kalman) and _plain(example):
             self._lanes = SharedLanes(example, KalmanGains, buffers)
@@ -49,11 +52,18 @@ class Together:
             self._lanes = SharedLanes(example, SettlingGains, buffers)
         elif isinstance(example, SageHusa) and _plain(example) and _adapts_only_R(example):
             self._lanes = AdaptiveLanes(example, buffers)
+        elif isinstance(example, Wideband) and _plain(example):
+            self._lanes = BankLanes(example, buffers)
 
     @property
     def in_lanes(self) -> bool:
         """Whether they can go side by side."""
         return self._lanes is not None
+
+    @property
+    def at_once(self) -> int:
+        """How many of them side by side go fastest."""
+        return BANKS_AT_ONCE if isinstance(self._lanes, BankLanes) else LANES
 
     def process(self, filters: Sequence[BlockFilter], received: Received) -> Iterator[EstimateBlock]:
         """Yield what each filter gives for its readings of a block; it holds until the next one of those that share
