@@ -83,15 +83,16 @@ class Recursion:
     b : ndarray, shape (n + 1,)
         Coefficients of the input, newest first, real or complex [-].
     a : ndarray, shape (m,)
-        Those of the output, m at most n + 1; the first is 1, what is missing 0 [-].
+        Those of the output; the first is 1, what is missing 0 [-].
     """
 
     def __init__(self, b: FloatArray | ComplexArray, a: FloatArray | ComplexArray) -> None:
         # NumPy's promotion: complex if one of them is.
         kind = np.result_type(b, a, float)
-        self._b, self._a = np.asarray(b, kind), np.zeros(len(b), kind)
-        self._a[: len(a)] = a
-        self.state = np.zeros(len(b) - 1, kind)
+        # A delay at least, which the kernel counts on.
+        n = max(len(a), len(b), 2)
+        self._b, self._a, self.state = np.zeros(n, kind), np.zeros(n, kind), np.zeros(n - 1, kind)
+        self._b[: len(b)], self._a[: len(a)] = b, a
 
     def process(self, u: FloatArray) -> Any:
         """Return the output, shape (n_time,), unit of `u`; at rest before the first, unless `state` was set."""
