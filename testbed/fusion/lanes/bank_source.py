@@ -14,6 +14,7 @@ from testbed.fusion.lanes.covariance_source import (
     covariance_functions,
     covariance_rows,
     noise_names,
+    number,
     shown_names,
 )
 from testbed.fusion.lanes.mixture_source import Bank, mixture_functions
@@ -156,8 +157,8 @@ def bank_source(pattern: Pattern, n_slow: int, n_filter: int) -> BankSource:
         width=LANES * len(bank.names),
         own=bank.names.index("own"),
         slower=bank.names.index("slower"),
-        kept=kept,
-        moved=kept + len(noise_names(pattern.n - n_slow)),
+        kept=number(kept),
+        moved=number(kept + len(noise_names(pattern.n - n_slow))),
         every=_CLOSED,
         readings="\n".join(_reading(i) for i in range(len(pattern.H))),
     )
