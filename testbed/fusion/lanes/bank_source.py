@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from testbed.fusion.lanes import heirs
 from testbed.fusion.lanes.covariance_source import (
     OF_READING,
+    as_argument,
     covariance_functions,
     covariance_rows,
     noise_names,
-    number,
     shown_names,
 )
 from testbed.fusion.lanes.mixture_source import Bank, mixture_functions
@@ -157,8 +157,8 @@ def bank_source(pattern: Pattern, n_slow: int, n_filter: int) -> BankSource:
         width=LANES * len(bank.names),
         own=bank.names.index("own"),
         slower=bank.names.index("slower"),
-        kept=number(kept),
-        moved=number(kept + len(noise_names(pattern.n - n_slow))),
+        kept=as_argument(kept),
+        moved=as_argument(kept + len(noise_names(pattern.n - n_slow))),
         every=_CLOSED,
         readings="\n".join(_reading(i) for i in range(len(pattern.H))),
     )
