@@ -7,8 +7,7 @@ import importlib.util
 import inspect
 import re
 from importlib import resources
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from rich.table import Table
 
@@ -22,6 +21,7 @@ from testbed.sensors import SENSORS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+    from importlib.abc import InspectLoader
 
 
 # Parts of a scenario's `pointing`.
@@ -101,8 +101,8 @@ def _docstring(module: str, name: str) -> str | None:
     """Return the docstring of a module, or of what it defines as `name`, out of its source."""
     spec = importlib.util.find_spec(module)
     assert spec is not None
-    assert spec.origin is not None
-    source = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    # Of the loader, since not every module is a file of its own: an archive of them is on the path, too.
+    source = ast.parse(cast("InspectLoader", spec.loader).get_source(module) or "")
     defined = {part.name: part for part in source.body if isinstance(part, ast.ClassDef | ast.FunctionDef)}
     return ast.get_docstring(defined[name] if name else source)
 

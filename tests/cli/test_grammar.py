@@ -6,9 +6,11 @@ import importlib
 import inspect
 import json
 import math
+import os
 import re
 import subprocess
 import sys
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -101,6 +103,20 @@ def test_a_summary_that_was_read_is_what_an_import_gives(kind, registry):
         part = resolve(kind, name, registry) if ":" in place else importlib.import_module(place)
         first = inspect.getdoc(part).split("\n\n")[0]
         assert catalogue()[kind][name] == re.sub(r"(:\w+:)?`", "", " ".join(first.splitlines()))
+
+
+def test_what_is_listed_is_found_in_an_archive_too(tmp_path):
+    """Modules on the path need not be files of their own."""
+    root, archive = Path(testbed.__file__).parent, tmp_path / "testbed.zip"
+    with zipfile.ZipFile(archive, "w") as packed:
+        for file in root.rglob("*"):
+            if file.suffix in {".py", ".yaml"}:
+                packed.write(file, Path("testbed") / file.relative_to(root))
+    code = "import json; from testbed.cli.catalogue import catalogue; print(json.dumps(catalogue()))"
+    environment = os.environ | {"PYTHONPATH": str(archive), "NUMBA_CACHE_DIR": str(tmp_path)}
+    made = [sys.executable, "-c", code]
+    said = subprocess.run(made, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(said.stdout) == catalogue()
 
 
 def test_list_says_the_whole_summary_on_a_narrow_terminal(monkeypatch, capsys):

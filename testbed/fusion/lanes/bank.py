@@ -190,7 +190,7 @@ class Banks:
         one._x[:], one._score[:] = W[:, : len(one._x)].T, W[:, self._names.index("score")]
         one._P[self._half] = self._C[of // LANES, : len(self._half[0]), of % LANES].T
         one._watch[due.any(axis=1), 0] = 0.0
-        one._setting[0] = 1.0
+        one._setting[0] = self._setting[0]
 
 
 def in_packs(members: Sequence[int]) -> list[int]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from testbed.fusion.lanes import heirs
 from testbed.fusion.lanes.covariance_source import (
     OF_READING,
+    as_argument,
     covariance_functions,
     covariance_rows,
     noise_names,
@@ -156,8 +157,8 @@ def bank_source(pattern: Pattern, n_slow: int, n_filter: int) -> BankSource:
         width=LANES * len(bank.names),
         own=bank.names.index("own"),
         slower=bank.names.index("slower"),
-        kept=kept,
-        moved=kept + len(noise_names(pattern.n - n_slow)),
+        kept=as_argument(kept),
+        moved=as_argument(kept + len(noise_names(pattern.n - n_slow))),
         every=_CLOSED,
         readings="\n".join(_reading(i) for i in range(len(pattern.H))),
     )

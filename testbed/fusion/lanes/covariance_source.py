@@ -74,6 +74,20 @@ def noise_names(core: int) -> list[str]:
     return [f"q{i}_{j}" for i in range(core) for j in range(i + 1)]
 
 
+def as_argument(value: int) -> str:
+    """Return a number as an argument: a bare one would be part of the type, and the function compiled for each.
+
+    Two processes that compile a function for different types at the same time may also take each other's code from
+    numba's disk cache.
+
+    Parameters
+    ----------
+    value : int
+        The number.
+    """
+    return f"np.int64({value})"
+
+
 def shown_names(pattern: Pattern) -> list[str]:
     """Return what filters look at of a covariance: the variance of the rate, and of each sensor gains and `OF_READING`.
 
@@ -163,7 +177,7 @@ def _advance(pattern: Pattern, rows: Workspace, shown: Sequence[str]) -> str:
         body += [f"        g[c, {shown.index(f'spread_{i}')}] = w[{spread} * LANES + c]"]
     for i in sensors:
         body += [f"if due[{i}]:", f"    if fresh != {i}:", f"        innovate{i}(w, H[{i}])", "    fresh = -1"]
-        body += [f"    use{i}(w, H[{i}], R[{i}])", f"    keep(w, g, {i}, R[{i}])"]
+        body += [f"    use{i}(w, H[{i}], R[{i}])", f"    keep(w, g, {as_argument(i)}, R[{i}])"]
     head = ["    lost = 0.0", "    for p in range(live.size):", "        if live[p] > 0:"]
     lines = [*head, *(f"            {line}" for line in body), "    return lost"]
     return function("advance_covariances(C, G, live, F, common, H, R, due, started)", lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from copy import deepcopy
 
 import numpy as np
@@ -143,6 +144,35 @@ def test_banks_whose_rate_gets_lost_go_alone(rng):
     assert side_by_side == []
     for a, b in zip(expected, found, strict=True):
         assert_same(a, b)
+
+
+def test_a_block_of_nothing_begins_nothing(rng):
+    """The first step of the next one is still that of the first reading, before which nothing moves."""
+    alone, lanes = banks(FEWEST, **FEW), banks(FEWEST, **FEW)
+    together, table = Together(lanes[0]), Table(lanes[0], len(lanes), rng)
+    for length in (0, 30):
+        given = table.readings(length)
+        expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
+        found, _ = process(together, lanes, given)
+        for a, b in zip(expected, found, strict=True):
+            assert_same(a, b)
+        for a, b in zip(alone, lanes, strict=True):
+            assert_left_alike(a, b)
+
+
+def test_no_argument_is_a_bare_number():
+    """Such a number is part of the type: what models share would be compiled for each, and two processes that do so at
+    the same time could take each other's code from the disk.
+    """
+    lanes = Together(banks(1, **FEW)[0])._lanes
+    assert lanes is not None
+    tree = ast.parse(lanes._source.text)
+    ours = {part.name for part in tree.body if isinstance(part, ast.FunctionDef)}
+    shared = [part for part in tree.body if isinstance(part, ast.ImportFrom) and part.module.startswith("testbed")]
+    ours |= {one.name for part in shared for one in part.names}
+    calls = [part for part in ast.walk(tree) if isinstance(part, ast.Call) and getattr(part.func, "id", "") in ours]
+    assert len({call.func.id for call in calls}) > 2
+    assert [ast.unparse(call) for call in calls if any(isinstance(one, ast.Constant) for one in call.args)] == []
 
 
 def test_more_seeds_are_there_at_once_where_they_share():
