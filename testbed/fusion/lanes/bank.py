@@ -52,8 +52,8 @@ class BankLanes:
         self._buffers = buffers
 
     def advance(self, filters: Sequence[Any], received: Received, whole: Sequence[int]) -> dict[int, EstimateBlock]:
-        """Advance those filters of `whole` that have begun alike, and return their estimates by number; none if they
-        are fewer than FEWEST.
+        """Advance those filters of `whole` that have begun alike and do not lose the rate at once, and return their
+        estimates by number; none if they are fewer than FEWEST.
 
         Parameters
         ----------
@@ -64,7 +64,8 @@ class BankLanes:
         whole : sequence of int
             Numbers of the filters that miss no reading.
         """
-        alike = [m for m in whole if filters[m]._setting[0] == filters[whole[0]]._setting[0]]
+        begun = [m for m in whole if filters[m]._setting[0] == filters[whole[0]]._setting[0]]
+        alike = [m for m in begun if not _loses_rate(filters[m])]
         if len(alike) < FEWEST:
             return {}
         due = np.isfinite(received[alike[0]][0])
@@ -191,6 +192,16 @@ class Banks:
         one._P[self._half] = self._C[of // LANES, : len(self._half[0]), of % LANES].T
         one._watch[due.any(axis=1), 0] = 0.0
         one._setting[0] = self._setting[0]
+
+
+def _loses_rate(one: Wideband) -> bool:
+    """Return whether the next step makes the variance of a rate so large that the kernel recalls it: after a gap; or in
+    every step, where the fastest filters expect more between two readings than there can be.
+    """
+    row = one.model.F[0]
+    seen = np.flatnonzero(row)
+    terms = (row[i] * row[j] * one._P[max(i, j), min(i, j)] for i in seen for j in seen)
+    return bool(one._setting[0] > 0.0 and (sum(terms) + one._Q[0, 0]).max() > LOST_VARIANCE)
 
 
 def in_packs(members: Sequence[int]) -> list[int]:

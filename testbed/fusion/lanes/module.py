@@ -41,7 +41,12 @@ def module_of(source: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        # Interrupted, it is not there: who asks again shall not find the first half of it.
+        del sys.modules[name]
+        raise
     return module
 
 

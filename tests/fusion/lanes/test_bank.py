@@ -132,18 +132,34 @@ def test_a_few_go_alone(rng):
     assert side_by_side == []
 
 
-def test_banks_whose_rate_gets_lost_go_alone(rng):
-    """The kernel recalls it, which the lanes do not know."""
-    alone, lanes = banks(FEWEST, **FEW), banks(FEWEST, **FEW)
-    for one in (*alone, *lanes):
-        one._setting[0] = 1.0
-        one._P[0, 0] = 2.0 * LOST_VARIANCE
-    given = Table(lanes[0], len(lanes), rng).readings(100)
-    expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
-    found, side_by_side = process(Together(lanes[0]), lanes, given)
-    assert side_by_side == []
-    for a, b in zip(expected, found, strict=True):
-        assert_same(a, b)
+def test_a_bank_that_loses_the_rate_at_once_goes_alone(rng):
+    """As after a gap up to the end of the last block: the kernel recalls it, which the lanes do not know."""
+    alone, lanes = banks(FEWEST + 1, **FEW), banks(FEWEST + 1, **FEW)
+    together, table = Together(lanes[0]), Table(lanes[0], len(lanes), rng)
+    for number in range(2):
+        given = table.readings(100)
+        expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
+        found, side_by_side = process(together, lanes, given)
+        assert side_by_side == [m for m in range(FEWEST + 1) if number == 0 or m != 3]
+        for a, b in zip(expected, found, strict=True):
+            assert_same(a, b)
+        alone[3]._P[0, 0] = lanes[3]._P[0, 0] = 2.0 * LOST_VARIANCE
+
+
+def test_banks_that_lose_the_rate_in_every_step_go_alone(rng, monkeypatch):
+    """In the first block it is found out, behind that nothing is tried any longer."""
+    lively = FEW | {"decades": 26.0}
+    alone, lanes = banks(FEWEST, **lively), banks(FEWEST, **lively)
+    together, table = Together(lanes[0]), Table(banks(1, **FEW)[0], len(lanes), rng)
+    for number in range(3):
+        given = table.readings(100)
+        expected = [one.process(values) for one, values in zip(alone, given, strict=True)]
+        found, side_by_side = process(together, lanes, given)
+        assert side_by_side == []
+        for a, b in zip(expected, found, strict=True):
+            assert_same(a, b)
+        if number == 0:
+            monkeypatch.setattr("testbed.fusion.lanes.bank.Banks.run", None)
 
 
 def test_a_block_of_nothing_begins_nothing(rng):

@@ -195,3 +195,13 @@ def test_a_folder_that_cannot_be_had_is_replaced(tmp_path, monkeypatch):
     (tmp_path / "testbed").write_text("in the way")
     monkeypatch.setattr(module.platformdirs, "user_cache_path", lambda name: tmp_path / name)
     assert module.module_of("value = 7\n").value == 7
+
+
+def test_a_module_that_was_interrupted_is_made_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_folder", lambda: tmp_path)
+    source = "import os\nif 'INTERRUPTED' in os.environ:\n    raise KeyboardInterrupt\nvalue = 7\n"
+    monkeypatch.setenv("INTERRUPTED", "")
+    with pytest.raises(KeyboardInterrupt):
+        module.module_of(source)
+    monkeypatch.delenv("INTERRUPTED")
+    assert module.module_of(source).value == 7
