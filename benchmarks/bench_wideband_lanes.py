@@ -119,38 +119,51 @@ def compiled_here(coloured: bool) -> float:
     return spent[0] - spent[1]
 
 
-@njit  # type: ignore[untyped-decorator]
-def steps(n: int, covariances: Any, states: Any, model: Any, arrays: Any, due: Any) -> None:  # pragma: no cover
-    """Advance a pack of filters, a covariance each."""
-    F, H, Q, R = model
-    C, G, live, W, of, even, z = arrays
-    for k in range(n):
-        covariances(C, G, live, F, Q, H, R, due[k % len(due)], True)
-        states(W, F, H, G, of, even, z, due[k % len(due)])
+def recursion(module: Any) -> Any:
+    """Return what advances a pack of filters, a covariance each, by functions of a generated module."""
+    grow, advance_states = module.grow, module.advance_states
+    innovate0, use0, innovate1, use1 = module.innovate0, module.use0, module.innovate1, module.use1
+
+    @njit  # type: ignore[untyped-decorator]
+    def steps(n: int, model: Any, arrays: Any, due: Any) -> None:  # pragma: no cover
+        F, H, Q, R = model
+        C, G, W, of, z = arrays
+        even = np.zeros(1, np.bool_)
+        for k in range(n):
+            now = due[k % len(due)]
+            grow(C, F, Q)
+            if now[0]:
+                innovate0(C, H[0])
+                use0(C, H[0], R[0])
+            if now[1]:
+                innovate1(C, H[1])
+                use1(C, H[1], R[1])
+            advance_states(W, F, H, G, of, even, z, now)
+
+    return steps
 
 
 def own_ns() -> float:
-    """Return what a step of a lane with a covariance of its own takes, of two sensors the gyro read at every tenth
-    step [ns]; print it.
+    """Return what the recursion of a lane with a covariance of its own takes a step, of two sensors the gyro read at
+    every tenth [ns]; print it.
     """
     belief = {name: one.model_copy(update={"lowest_frequency": 1e-3}) for name, one in default_belief().items()}
     one = Wideband(belief, RATES, WidebandParameters(start="rest"))
     model, n, core = one.model, len(one.model.F), len(one.model.F) - one.model.n_slow
     source = bank_source(pattern_of(one), model.n_slow, len(one._score))
-    made = sys.modules[module_of(source.text).run.py_func.__module__]
+    steps = recursion(sys.modules[module_of(source.text).run.py_func.__module__])
     half = np.concatenate([one._P[np.tril_indices(n)], one._Q[np.tril_indices(core)]])
     # In each lane another filter of the bank.
-    C, W = np.zeros((1, len(source.of_covariance), LANES)), np.zeros(LANES * len(source.bank.names))
-    C[0, : len(half)] = half
-    G, live, of = np.zeros((LANES, source.shown)), np.array([LANES]), np.arange(LANES)[None]
-    arrays = (C.reshape(1, -1), G, live, W, of, np.array([False]), np.full((2, LANES), 1e-6))
+    C, W = np.zeros((len(source.of_covariance), LANES)), np.zeros(LANES * len(source.bank.names))
+    C[: len(half)] = half
+    G, of, z = np.zeros((LANES, source.shown)), np.arange(LANES)[None], np.full((2, LANES), 1e-6)
     due = np.array([[k == 0 or name == "mhd_ars" for name in one.schedule.sensors] for k in range(10)])
     spent = []
     for _ in range(30):
         begin = time.process_time()
-        steps(2000, made.advance_covariances, made.advance_states, (model.F, model.H, model.Q, one._R), arrays, due)
+        steps(2000, (model.F, model.H, model.Q, one._R), (C.reshape(-1), G, W, of, z), due)
         spent.append(1e9 * (time.process_time() - begin) / (2000 * LANES))
-    print(f"{n} states, a covariance of its own: {min(spent):.1f} ns a step")
+    print(f"{n} states, a covariance of its own: {min(spent):.1f} ns a step of the recursion")
     return min(spent)
 
 

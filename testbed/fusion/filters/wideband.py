@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from testbed.fusion.analysis.indicator import FrequencyRows
 from testbed.fusion.base import Rows, Switch
@@ -58,6 +58,14 @@ class WidebandParameters(FormParameters):
     restart: Annotated[float, Field(gt=0.0)] = 20.0
     surprise: Annotated[float, Field(ge=3.0, le=1e6)] = 10.0
     patience: Annotated[int, Field(ge=0)] = 10
+
+    @field_validator("q", mode="after")
+    @classmethod
+    def _a_multiple_of_it_is_more(cls, value: float) -> float:
+        if not value > 0.0:
+            msg = f"expected more than 0, since the highest q of the bank is a multiple of it, got {value:g}"
+            raise ValueError(msg)
+        return value
 
 
 class Wideband(ModelFilter):

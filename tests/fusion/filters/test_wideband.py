@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from testbed.fusion.belief import load_belief
 from testbed.fusion.filters.wideband import Wideband, WidebandParameters
@@ -204,3 +205,8 @@ def test_what_was_refused_is_counted(reference: Any) -> None:
 def test_every_parameter_changes_the_estimate(reference: Any, change: dict[str, Any]) -> None:
     readings = spoilt(reference.readings(reference.sines((4.0, 1.0), duration=1.1), 7), "spike")
     assert not np.array_equal(run(readings, **change).rate, run(readings).rate)
+
+
+def test_a_bank_without_a_slow_end_is_refused():
+    with pytest.raises(ValidationError, match="expected more than 0, since the highest q of the bank is a multiple"):
+        WidebandParameters(q=0.0)
