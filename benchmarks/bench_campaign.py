@@ -1,7 +1,8 @@
 """A campaign: what a further seed costs, and a step of filters side by side in lanes.
 
 CPU seconds of `testbed.evaluate` on the mixed scenario (20 s, three filters, modal plant) with 2 and with 34 seeds: the
-difference is what a further seed costs, and 1000 seeds are extrapolated from both. Lanes: nanoseconds per lane and
+difference is what a further seed costs, and 1000 seeds are extrapolated from both; and of one whole `testbed.run` in
+memory, imports and compiled functions loaded. Lanes: nanoseconds per lane and
 step, of filters that share one covariance and of filters that have their own: of the recursion alone, readings lane
 beside lane in, estimates, claims and innovations out; and of all that a block costs, gains for 128 seeds, readings and
 estimates moved to and from each lane's arrays included. CPU seconds that the compiler takes for their
@@ -147,6 +148,8 @@ def main() -> None:
     scenario = testbed.load_scenario(SCENARIO).with_(**{"turntable.engine": "modal"})
     coloured = scenario.with_(**{"fusion.kalman": {"belief": "exact"}}).fusion["kalman"].belief
     testbed.evaluate(scenario.with_(duration="2 s", settle="1 s"), range(2))
+    white = scenario.with_(**{"fusion.kalman": {"coloured": False}})
+    whole = seconds(lambda: testbed.run(white), 3)
     few = seconds(lambda: testbed.evaluate(scenario, range(2)), 2)
     many = seconds(lambda: testbed.evaluate(scenario, range(most)), 2)
     further = (many - few) / (most - 2)
@@ -156,6 +159,7 @@ def main() -> None:
     shared, own = compile_s("kalman", coloured=False), compile_s("shakf")
     print(f"compiling lanes of five states: {shared:.1f} CPU s with a shared covariance, {own:.1f} with their own")
     promises = [
+        Promise("a run of 20 s in memory, 3 filters of white noise, modal plant [CPU s]", 0.65, whole),
         Promise("a further seed x 3 filters x 20 s, modal plant [CPU s]", 0.06, further),
         Promise("1000 seeds x 3 filters x 20 s, modal plant, extrapolated [CPU s]", 60.0, float(thousand)),
     ]
