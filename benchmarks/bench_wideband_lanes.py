@@ -3,11 +3,11 @@ scenarios.
 
 A filter of the bank that starts again from a better one goes on with a covariance of its own; under seeds in lockstep
 all that do so at one step from one covariance share what it becomes. Printed for a table at rest, two lines, and
-jitter, with the identified belief and with white noise only: microseconds a seed and step of both, and how many
-covariances there are for each seed, of 16 filters. Both work on the same block, one after the other, and the ratio is
-the median of the blocks; what the compiler takes in an empty cache folder is printed beside. The estimates shall be the
-same to 1e-12; they are to the bit. And nanoseconds a step of a filter of 16 states that shares its covariance with no
-other, lane beside lane. Run:
+jitter, with the belief eq39, states for slow noise and without, no reading missing: microseconds a seed and step of
+both, and how many covariances there are for each seed, of 16 filters. Both work on the same block, one after the other,
+and the ratio is the median of the blocks; what the compiler takes in an empty cache folder is printed beside. The
+estimates shall be the same to 1e-12; they are to the bit. And nanoseconds a step of a filter of 16 states that shares
+its covariance with no other, lane beside lane. Run:
 python benchmarks/bench_wideband_lanes.py
 """
 
